@@ -1,0 +1,99 @@
+"""What a fit is asked (FitOptions) and what it answers (Fit, Status)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from ..arrays import Array, read_only
+from ..camera import Camera, project
+from ..model import FaceModel
+from ..observation import Observation
+
+
+class Status(StrEnum):
+    """How a fit ended; only CONVERGED is a result to rely on."""
+
+    CONVERGED = "converged"  # the projected gradient vanishes: no step inside the box lowers the cost
+    MAX_STEPS = "step limit reached"
+    STALLED = "no further decrease"  # rounding stopped the descent before the gradient vanished
+
+
+@dataclass(frozen=True, slots=True)
+class FitOptions:
+    """Options of `fit`, in the units of a user. All have defaults."""
+
+    modes: int = 70  # S, shape modes used; models with fewer use all they have
+    box: float | None = 2.0  # |alpha_j| <= box standard deviations; None: no box
+    noise_percent: float = 1.0  # landmark sd per coordinate the prior assumes, % of the interocular distance
+    prior_weight: float | None = None  # lambda in px^2 itself, instead of noise_percent
+    tolerance: float = 1e-8  # relative cost above the optimum that still counts as converged
+    max_steps: int = 100
+
+    def __post_init__(self) -> None:
+        if self.modes < 1:
+            raise ValueError(f"modes: {self.modes} is not at least 1")
+        if self.box is not None and not 0 < self.box <= 10:
+            raise ValueError(f"box: {self.box:g} is not within 0 to 10 standard deviations")
+        if not 0.001 <= self.noise_percent <= 20:
+            raise ValueError(f"noise_percent: {self.noise_percent:g} is not within 0.001 to 20")
+        if self.prior_weight is not None and not 0 <= self.prior_weight < np.inf:
+            raise ValueError(f"prior_weight: {self.prior_weight:g} is not a weight in px^2")
+        if not 1e-14 <= self.tolerance <= 1e-2:
+            raise ValueError(f"tolerance: {self.tolerance:g} is not within 1e-14 to 0.01")
+        if self.max_steps < 1:
+            raise ValueError(f"max_steps: {self.max_steps} is not at least 1")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fit:
+    """Best face and camera for one observation. S modes, L landmarks."""
+
+    model: FaceModel
+    observation: Observation
+    options: FitOptions
+    camera: Camera  # (U); pixels from the principal point
+    alpha: Array  # (S,) shape, in standard deviations
+    rotation: Array  # (3,) axis-angle, radians; 0 is a frontal face (MATH.md 1)
+    translation: Array  # (3,) metres, camera axes; (2,) if orthographic
+    focal: float | None  # pixels; None if orthographic
+    scale: float | None  # pixels per metre if orthographic, else None
+    residual: Array  # (L, 2) observed minus projected, pixels; NaN where not visible
+    cost: float  # E of MATH.md 3: squared pixels, prior included, no factor 1/2
+    prior_weight: float  # lambda, px^2
+    interocular_px: float  # the distance d_L is a percentage of
+    interocular_meaning: str
+    steps: int
+    status: Status  # "converged" only if the projected gradient says so
+
+    def __post_init__(self) -> None:
+        for name in ("alpha", "rotation", "translation", "residual"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    @property
+    def converged(self) -> bool:
+        """Whether the result can be relied on."""
+        return self.status is Status.CONVERGED
+
+    @property
+    def distance(self) -> float | None:
+        """t_z in metres, None if orthographic."""
+        return self.camera.distance
+
+    @property
+    def d_l_percent(self) -> float:
+        """d_L: mean landmark distance in percent of the interocular distance, over the visible points."""
+        gaps = np.linalg.norm(self.residual[self.observation.visible], axis=1)
+        return 100.0 * float(gaps.mean()) / self.interocular_px
+
+    def vertices(self) -> Array:
+        """The fitted surface (N, 3), metres, model axes."""
+        return self.model.vertices(self.alpha)
+
+    def projected(self) -> Array:
+        """(L, 2) pixels: the model's landmarks in the picture, those of missing points too."""
+        mean, modes = self.model.rows(self.observation.vertices(self.model))
+        points = mean + modes[:, :, : len(self.alpha)] @ self.alpha
+        return project(self.camera, points) + self.observation.centre

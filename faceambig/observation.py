@@ -1,0 +1,165 @@
+"""Observation: the points of one photograph, and `observe`, which takes a synthetic one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .arrays import Array, IntArray, checked, read_only
+from .camera import Camera, depths, project
+from .model import FaceModel, Scheme, Subject
+from .rotation import rotation_from_angles
+
+MIN_POINTS = 6  # six pose unknowns at a known distance; fewer leave the pose itself open (MATH.md 8.4)
+FLATTEST = 1e-3  # smallest ratio of the two singular values of the points before they count as one line
+DISTANCES = (0.2, 5.0)  # metres, of the camera that took the photograph; nearer, the nose leaves the lens's view
+EYES_PX = 100.0  # synthetic photographs: frontal distance of the eye centres in a picture of 500 x 500
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Observation:
+    """Points of one photograph. L landmarks."""
+
+    points: Array  # (L, 2) pixels, x right, y down; NaN = not visible
+    scheme: str | IntArray  # name of the model's landmark scheme, or (L,) vertex numbers
+    image_size: tuple[int, int] | None = None  # width, height, pixels
+    principal_point: tuple[float, float] | None = None  # pixels; None: the middle of the picture
+    weights: Array | None = None  # (L,) >= 0, a point given twice equals weight 2; None: all 1
+
+    def __post_init__(self) -> None:
+        points = checked("points", self.points, (None, 2), nan=True)
+        object.__setattr__(self, "points", read_only(points))
+        if not isinstance(self.scheme, str):
+            numbers = np.asarray(self.scheme)
+            if numbers.dtype.kind not in "iu" or numbers.shape != (len(points),):
+                raise ValueError(f"scheme: expected a name or {len(points)} vertex numbers")
+            object.__setattr__(self, "scheme", read_only(numbers.astype(np.intp)))
+        if self.weights is not None:
+            weights = checked("weights", self.weights, (len(points),))
+            if (weights < 0).any():
+                raise ValueError(f"weights: {weights.min():g} is negative")
+            object.__setattr__(self, "weights", read_only(weights))
+        if self.image_size is not None and min(self.image_size) < 1:
+            raise ValueError(f"image_size: {self.image_size} is not a width and a height in pixels")
+        if self.principal_point is not None:
+            checked("principal_point", self.principal_point, (2,))
+        self._refuse_unusable()
+
+    def _refuse_unusable(self) -> None:
+        visible = self.points[self.visible]
+        if len(visible) < MIN_POINTS:
+            raise ValueError(
+                f"points: {len(visible)} visible; {MIN_POINTS} are needed, 12 are better"
+            )
+        spread = np.linalg.svd(visible - visible.mean(0), compute_uv=False)
+        if spread[1] <= FLATTEST * spread[0]:
+            raise ValueError(
+                "points: they lie on one line, no pose can be found; add a point off the line"
+            )
+
+    @property
+    def visible(self) -> np.ndarray:
+        """(L,) True where the point is given and weighs something."""
+        seen = np.isfinite(self.points).all(axis=1)
+        return seen if self.weights is None else seen & (self.weights > 0)
+
+    @property
+    def centre(self) -> Array:
+        """Principal point (2,), pixels: as given, else the middle of the picture, else of the points."""
+        if self.principal_point is not None:
+            return np.asarray(self.principal_point, dtype=np.float64)
+        if self.image_size is not None:
+            return 0.5 * np.asarray(self.image_size, dtype=np.float64)
+        return 0.5 * (np.nanmin(self.points, axis=0) + np.nanmax(self.points, axis=0))
+
+    @property
+    def centre_meaning(self) -> str:
+        """Where `centre` comes from, in words, for the output."""
+        if self.principal_point is not None:
+            return "given"
+        return "middle of the picture" if self.image_size is not None else "middle of the points"
+
+    def vertices(self, model: FaceModel) -> IntArray:
+        """(L,) vertex numbers of the points on `model`; ValueError if they do not belong together."""
+        if isinstance(self.scheme, str):
+            scheme = model.scheme(self.scheme)
+            if len(scheme) != len(self.points):
+                raise ValueError(
+                    f"points: {len(self.points)} for scheme {scheme.name!r}, which has {len(scheme)}"
+                )
+            return scheme.vertices
+        if self.scheme.min() < 0 or self.scheme.max() >= model.n_vertices:
+            raise ValueError(
+                f"scheme: vertex {self.scheme.max()} is not within 0 to {model.n_vertices - 1}"
+            )
+        return self.scheme
+
+
+def eye_distance(points: Array, scheme: Scheme) -> float:
+    """Distance of the two eye centres of `points` (L, k) in scheme order, in the points' unit; NaN if one is missing."""
+    right, left = (points[list(rows)].mean(axis=0) for rows in scheme.eyes)
+    return float(np.linalg.norm(left - right))
+
+
+def portrait_camera(
+    face: Subject,
+    *,
+    distance: float | None,
+    scheme: str = "ibug68",
+    yaw_deg: float = 0.0,
+    pitch_deg: float = 0.0,
+    roll_deg: float = 0.0,
+    eyes_px: float = EYES_PX,
+) -> Camera:
+    """The camera of a synthetic portrait: origin of the model in the middle, zoomed for a constant eye distance.
+
+    The zoom is the one that makes the eye centres of the *frontal* face `eyes_px` apart, so a portrait from far away is
+    the same size as one from near, and turning the head does not zoom. distance None is a far-away camera.
+    """
+    if distance is not None and not DISTANCES[0] <= distance <= DISTANCES[1]:
+        raise ValueError(f"distance: {distance:g} m is not within {DISTANCES[0]:g} to {DISTANCES[1]:g}")
+    kappa = 0.0 if distance is None else 1.0 / distance
+    points = face.vertices[face.model.scheme(scheme).vertices]
+    frontal = Camera(rotation_from_angles(0, 0, 0), np.zeros(2), 1.0, kappa)
+    s = eyes_px / eye_distance(project(frontal, points), face.model.scheme(scheme))
+    camera = Camera(rotation_from_angles(yaw_deg, pitch_deg, roll_deg), np.zeros(2), s, kappa)
+    if (depths(camera, points) <= 0).any():
+        raise ValueError(f"distance: at {distance:g} m a point lies behind the camera; take the photo from farther away")
+    return camera
+
+
+def observe(
+    face: Subject,
+    *,
+    distance: float | None,
+    scheme: str = "ibug68",
+    yaw_deg: float = 0.0,
+    pitch_deg: float = 0.0,
+    roll_deg: float = 0.0,
+    noise_percent: float = 0.0,
+    seed: int = 0,
+    eyes_px: float = EYES_PX,
+) -> Observation:
+    """A synthetic photograph of `face`: its landmarks in a picture of 5 x 5 eye distances.
+
+    Parameters
+    ----------
+    distance: metres from the camera to the middle between the eyes of the mean head; None is orthographic.
+    noise_percent: landmark noise, sd per coordinate in percent of the distance of the eye centres in the picture.
+    seed: of the noise.
+    eyes_px: pixels between the eye centres of the frontal face.
+    """
+    if not 0 <= noise_percent <= 20:
+        raise ValueError(f"noise_percent: {noise_percent:g} is not within 0 to 20")
+    camera = portrait_camera(
+        face, distance=distance, scheme=scheme, yaw_deg=yaw_deg, pitch_deg=pitch_deg, roll_deg=roll_deg, eyes_px=eyes_px
+    )
+    landmarks = face.model.scheme(scheme)
+    side = round(5 * eyes_px)
+    points = project(camera, face.vertices[landmarks.vertices]) + 0.5 * side
+    if noise_percent > 0:
+        sigma = noise_percent / 100 * eye_distance(points, landmarks)
+        points = points + np.random.default_rng(seed).normal(scale=sigma, size=points.shape)
+    return Observation(points, scheme, image_size=(side, side))

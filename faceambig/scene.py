@@ -1,0 +1,114 @@
+"""Scene: everything one picture of the page or a snapshot shows, as plain arrays. No behaviour.
+
+The page (viser) and the snapshot (pyrender) both draw a Scene and can compute nothing themselves, so they cannot
+disagree. Heads stand in a row: each has a `slot`, metres along the viewer's right, and turns in place about its origin.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .arrays import Array, IntArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Head:
+    """One head of the row. V vertices, F triangles; model axes, origin between the eyes."""
+
+    name: str  # node name, "true" or "fit" or "fit60"
+    title: str  # words above the head
+    vertices: Array  # (V, 3) metres
+    faces: NDArray[np.uint32]  # (F, 3)
+    colours: NDArray[np.uint8]  # (V, 3) sRGB
+    occlusion: NDArray[np.uint8] | None = None  # (V,) ambient occlusion, 255 open; darkens `colours`
+    lit: bool = True  # False: colours are values of a legend and are shown as they are, shading reduced
+    slot: float = 0.0  # metres along the viewer's right
+    caption: tuple[tuple[str, str], ...] = ()  # lines under the head: (text, tone), tone "dim", "d_l" or "d_s"
+    coarse_faces: NDArray[np.uint32] | None = None  # over the first vertices: the mesh while a hand moves
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """Where the viewer stands: a long lens far away, not the subject's camera."""
+
+    name: str  # front, three_quarter, side, top, free
+    azimuth_deg: float  # 0 front; positive: the viewer sees more of the subject's left side
+    elevation_deg: float  # positive: from above
+    half_height: float  # metres shown above and below the centre, at zoom 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Photo:
+    """The synthetic photograph and the points on it. Pixels: x right, y down."""
+
+    width: int
+    height: int
+    observed: Array  # (L, 2) pixels, NaN where missing
+    projected: Array  # (L, 2) pixels, the same points of the fitted face
+    names: tuple[str, ...]  # L names of the points
+    caption: str  # "taken from 30 cm"
+    vertices: Array  # (V, 3) metres in camera axes (x right, y down, z forward)
+    faces: NDArray[np.uint32]  # (F, 3)
+    colours: NDArray[np.uint8]  # (V, 3) sRGB
+    occlusion: NDArray[np.uint8] | None
+    focal: float  # pixels
+    principal: tuple[float, float]  # pixels
+    fit_vertices: Array | None = None  # (V, 3) the fitted face in camera axes, for the view "camera"
+    fit_focal: float | None = None  # pixels, per metre of depth as `focal`
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Curves:
+    """d_L and d_S against the assumed distance: the sweep behind the two plots."""
+
+    distances: Array  # (D,) metres, ascending
+    d_l_percent: Array  # (D,)
+    d_s_mm: Array  # (D,)
+    orthographic: tuple[float, float]  # d_L percent and d_S mm of the far-away camera
+    true_distance: float  # metres
+    tolerance_percent: float  # a person cannot tell below this
+
+
+@dataclass(frozen=True, slots=True)
+class Numbers:
+    """The numbers beside the heads."""
+
+    distance: float | None  # metres; None: orthographic
+    d_l_percent: float
+    d_s_mm: float
+    converged: bool
+    plausible: bool  # every coefficient inside the box
+    eyes_meaning: str  # the definition of d_L's unit
+    flex_words: str = ""  # what the flexibility mode moves
+    flex_mm: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Legend:
+    """A colour scale: value of the first and the last colour, evenly spaced between."""
+
+    title: str
+    colours: NDArray[np.uint8]  # (K, 3) sRGB, first is `low`
+    low: float
+    high: float
+    ticks: tuple[float, ...]
+    note: str = ""  # "grey: not measured"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """What is drawn. Views beyond the first are further rows of the same heads (snapshot strips)."""
+
+    heads: tuple[Head, ...]
+    views: tuple[View, ...]
+    photo: Photo
+    numbers: Numbers
+    curves: Curves | None = None
+    legend: Legend | None = None
+    through_camera: bool = False  # the picture is the photo itself, fitted face beside true face
+    scale_bar: float = 0.05  # metres
+    note: str = ""  # one line: model, subject, what is grey
+    landmarks: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.intp))  # (L,) vertices marked on heads
