@@ -96,16 +96,22 @@ class Painter:
         for pupil in base.pupils:
             side = np.sign(mean[:, 0]) == np.sign(mean[pupil, 0])
             self.upper[side] = smooth_step(mean[side, 1] - mean[pupil, 1], 0.0, 0.003)
-        self.brow_curves = [mean[ibug[a:b]][:, :2] for a, b in ((17, 22), (22, 27))]
-        self.brow_curves[0] = self.brow_curves[0][::-1]  # both run from the head to the tail
+        # Right brow reversed, so that both run from the head to the tail. A parabola through the
+        # five landmarks: straight pieces between them would draw an angry, angular brow.
+        self.brow_curves = []
+        for numbers in (ibug[17:22][::-1], ibug[22:27]):
+            x, y = mean[numbers, :2].T
+            x_fine = np.linspace(x[0], x[-1], 24)
+            arch = np.polynomial.Polynomial.fit(x, y, 2)(x_fine)
+            self.brow_curves.append(np.stack([x_fine, arch], axis=1))
 
     def brows(self, width: float) -> Array:
         """Weight (N,) of the brows, thickest at one third, thin at the tail."""
         weight = np.zeros(len(self.mean))
         for curve in self.brow_curves:
             distance, place = along(curve, self.mean[:, :2])
-            half = 1e-3 * width * np.interp(place, [0, 0.3, 0.65, 1.0], [3.0, 3.4, 2.4, 0.9])
-            edge = 1.0 - smooth_step(distance / half, 0.45, 1.55)
+            half = 1e-3 * width * np.interp(place, [0, 0.3, 0.65, 1.0], [2.7, 3.1, 2.4, 1.0])
+            edge = 1.0 - smooth_step(distance / half, 0.35, 1.65)
             front = self.mean[:, 2] > -0.05
             weight = np.maximum(weight, edge * front * np.interp(place, [0, 0.15, 1], [0.6, 1, 1]))
         return weight
@@ -127,9 +133,9 @@ class Painter:
         mix(tone.blood * 0.25 * blob(self.mean, at["pg", "mid"], 0.014), flush)
         mix(0.55 * self.ears * tone.blood, skin * [0.99, 0.76, 0.73])
         mix(0.30 * self.lids, skin * [0.86, 0.78, 0.78])
-        mix(0.9 * smooth_step(self.lips, 0.15, 0.75), tone.lips)
-        mix(0.85 * smooth_step(self.slit, 0.25, 0.9), np.array(tone.lips) * [0.52, 0.40, 0.40])
-        mix(0.88 * self.brows(tone.brow_width), tone.brows)
+        mix(0.8 * smooth_step(self.lips, 0.1, 0.85), tone.lips)
+        mix(0.8 * smooth_step(self.slit, 0.3, 1.0), np.array(tone.lips) * [0.62, 0.50, 0.50])
+        mix(0.78 * self.brows(tone.brow_width), tone.brows)
 
         eye = smooth_step(self.ball, 0.35, 0.75)
         mix(eye, (232.0, 226.0, 220.0))
