@@ -1,0 +1,63 @@
+# `make demo` opens the page, `make test` runs the tests: both install what they need, below .venv.
+PY ?= python3
+PORT ?= 8080
+UV := $(shell command -v uv)
+ifdef UV # the same files from the same lock, faster
+VENV = uv venv --allow-existing --python "$(PY)" .venv
+INSTALL = uv pip install --python .venv
+else
+VENV = "$(PY)" -m venv .venv
+INSTALL = .venv/bin/pip install --disable-pip-version-check
+endif
+LOCKED = $(INSTALL) --no-deps --require-hashes -r
+
+# One thread each: the libraries under NumPy and SciPy are two, and more threads than cores wait for each other.
+export OPENBLAS_NUM_THREADS = 1
+export OMP_NUM_THREADS = 1
+
+.PHONY: demo test check fix lock head clean for-demo for-test
+.NOTPARALLEL:
+
+demo: for-demo .venv/.app
+	.venv/bin/faceambig serve --port $(PORT)
+
+test: for-test .venv/.dev
+	.venv/bin/python -m pytest -n 2 $(TESTS)
+
+check: .venv/.dev
+	.venv/bin/ruff check
+	.venv/bin/ruff format --check
+	.venv/bin/lint-imports --no-logo
+	.venv/bin/pyright
+
+fix: .venv/.dev
+	.venv/bin/ruff check --fix
+	.venv/bin/ruff format
+
+# Needs uv. Keeps the versions in the locks; UPGRADE=--upgrade takes the newest that pyproject.toml allows.
+# Universal and of few forks: one version of each package on every Python and system.
+COMPILE = uv pip compile --universal --generate-hashes --python-version 3.11 --fork-strategy fewest \
+	--no-emit-index-url --custom-compile-command "make lock" --quiet $(UPGRADE) pyproject.toml
+lock:
+	$(COMPILE) --extra app --group build -o requirements.lock
+	$(COMPILE) --extra dev -c requirements.lock -o requirements-dev.lock
+
+clean:
+	rm -rf .venv build dist .coverage .hypothesis .pytest_cache .ruff_cache .import_linter_cache
+
+for-demo:
+	@tools/system_packages.sh "$(PY)" venv gl
+
+for-test:
+	@tools/system_packages.sh "$(PY)" venv gl browser
+
+.venv/.app: pyproject.toml requirements.lock
+	@tools/system_packages.sh "$(PY)" venv
+	$(VENV)
+	$(LOCKED) requirements.lock
+	$(INSTALL) --no-deps --no-build-isolation -e .
+	@touch $@
+
+.venv/.dev: .venv/.app requirements-dev.lock
+	$(LOCKED) requirements-dev.lock
+	@touch $@

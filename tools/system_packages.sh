@@ -1,0 +1,81 @@
+#!/bin/sh
+# Finds what pip cannot bring and gets it where that is allowed: as root on Debian and Ubuntu by apt-get.
+# Elsewhere it says in one line what to type; it never calls sudo.
+#
+#   tools/system_packages.sh PYTHON [venv] [gl] [browser]
+#
+# Exit 1 if PYTHON cannot serve. A missing renderer or browser stops nothing here: the tests that need
+# one skip with a reason, or fail where CI=true.
+set -eu
+
+python=$1
+shift
+wanted=$*
+renderer="libegl1 libgl1 libgl1-mesa-dri libosmesa6"
+
+stop() {
+    echo "$1" >&2
+    exit 1
+}
+
+loads() {
+    "$python" -c 'import ctypes, sys; [ctypes.CDLL(name) for name in sys.argv[1:]]' "$@" 2>/dev/null
+}
+
+has() {
+    case $1 in
+    venv) command -v uv >/dev/null || "$python" -c 'import ensurepip, venv' 2>/dev/null ;;
+    gl) loads libOSMesa.so.8 || loads libEGL.so.1 libGL.so.1 ;;
+    browser)
+        [ -n "${FACEAMBIG_CHROMIUM:-}" ] || command -v chromium || command -v chromium-browser ||
+            command -v google-chrome || ls -d "$HOME"/.cache/ms-playwright/chromium-*
+        ;;
+    esac >/dev/null 2>&1
+}
+
+# The packages for what is missing, in $packages; a browser that apt cannot give, in $by_playwright.
+find_missing() {
+    packages= by_playwright=
+    for need in $wanted; do
+        has "$need" && continue
+        case $need in
+        venv) packages="$packages python3-venv" ;;
+        gl) packages="$packages $renderer" ;;
+        browser)
+            # Ubuntu has Chromium as a snap only, which cannot be steered from outside.
+            if [ "$system" = ubuntu ]; then by_playwright=yes; else packages="$packages chromium"; fi
+            ;;
+        esac
+    done
+    packages=${packages# }
+}
+
+system=$(. /etc/os-release 2>/dev/null && echo "${ID:-}") || system=
+find_missing
+
+if [ -n "$packages" ] && [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
+    export DEBIAN_FRONTEND=noninteractive
+    echo "apt-get install $packages"
+    apt-get -qq -o DPkg::Lock::Timeout=120 update || true
+    known=
+    for package in $packages; do
+        # Newer systems have no libosmesa6: EGL alone serves there.
+        apt-cache show "$package" >/dev/null 2>&1 && known="$known $package"
+    done
+    # shellcheck disable=SC2086 # one word a package
+    apt-get -qq -o DPkg::Lock::Timeout=120 install -y --no-install-recommends $known </dev/null || true
+    find_missing
+fi
+
+"$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null ||
+    stop "faceambig needs Python 3.11 or newer and '$python' is not: make PY=/path/to/python3.11 ..."
+if [ -n "$packages" ]; then
+    line="to type: sudo apt-get install -y $packages"
+    case " $packages " in
+    *" python3-venv "*) stop "python3 cannot make a virtual environment; $line" ;;
+    *) echo "missing for pictures or page tests; $line" >&2 ;;
+    esac
+fi
+if [ -n "$by_playwright" ]; then
+    echo "no Chromium for the page tests; to type: .venv/bin/playwright install --with-deps chromium" >&2
+fi
