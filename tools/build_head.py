@@ -40,7 +40,7 @@ Ints = NDArray[np.int64]
 ASSETS = Path(__file__).parent.parent / "assets"
 N_MODES = 100
 N_PEOPLE, SEED = 2_000, 20_190
-N_SUBJECTS, SUBJECT_SEED = 10, 4_711
+N_SUBJECTS, SUBJECT_SEED = 10, 15  # ten who differ well, chosen by eye among five seeds
 MODE_STEP = 2.5e-7  # metres, doubled where a mode does not fit int16: 1 micrometre in a head
 SUBJECT_STEP = 1e-5
 DECIMETRE = 0.1  # of the source, in metres
@@ -171,9 +171,9 @@ def tone_of(ancestry: Array, sex: float, draw: Array) -> paint.Tone:
     """A plausible tone for an ancestry mix (3,); draw (4,) in 0..1 places it inside the range."""
     # Three points from light to dark of each range, sRGB, averaged by ancestry in linear light.
     ranges = np.array([
-        [(160, 109, 78), (115, 74, 52), (74, 48, 36)],
-        [(234, 197, 166), (213, 168, 132), (176, 127, 92)],
-        [(238, 204, 184), (224, 180, 154), (199, 150, 120)],
+        [(156, 108, 79), (112, 74, 53), (72, 47, 36)],
+        [(228, 190, 158), (207, 163, 127), (172, 124, 90)],
+        [(231, 195, 173), (217, 175, 148), (192, 144, 114)],
     ], dtype=float)  # fmt: skip
     places = np.interp(draw[0], [0.0, 0.5, 1.0], [0.0, 1.0, 2.0])
     low = min(int(places), 1)

@@ -119,12 +119,17 @@ def main() -> None:
         np.log(axes.sd[fitted] / neutral_sd),
     ]).ravel()
     step = np.repeat([0.3, 0.3, 0.1], len(fitted))
+    # Millimetres, millimetres, log: bounds against the absurd; the ridge is what holds.
+    low = np.repeat([-12.0, -4.0, -1.6], len(fitted))
+    high = np.repeat([12.0, 4.0, 1.1], len(fitted))
     found = least_squares(
-        residuals, start, x_scale=step, diff_step=1e-3, max_nfev=12, verbose=1,
-        bounds=(
-            np.repeat([-12.0, -4.0, -1.6], len(fitted)), np.repeat([12.0, 4.0, 1.1], len(fitted))
-        ),
-    )  # fmt: skip
+        residuals,
+        np.clip(start, low + 1e-3, high - 1e-3),  # files are rounded: a bound may be just missed
+        x_scale=step,
+        diff_step=1e-3,
+        max_nfev=12,
+        bounds=(low, high),
+    )
     best = apply(found.x)
     v = values(best)
     print(report(v, survey))

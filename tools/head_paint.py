@@ -110,10 +110,10 @@ class Painter:
         weight = np.zeros(len(self.mean))
         for curve in self.brow_curves:
             distance, place = along(curve, self.mean[:, :2])
-            half = 1e-3 * width * np.interp(place, [0, 0.3, 0.65, 1.0], [2.7, 3.1, 2.4, 1.0])
+            half = 1e-3 * width * np.interp(place, [0, 0.3, 0.65, 1.0], [2.7, 3.1, 2.6, 1.9])
             edge = 1.0 - smooth_step(distance / half, 0.35, 1.65)
             front = self.mean[:, 2] > -0.05
-            weight = np.maximum(weight, edge * front * np.interp(place, [0, 0.15, 1], [0.6, 1, 1]))
+            weight = np.maximum(weight, edge * front * np.interp(place, [0, 0.15, 0.6, 1], [0.6, 1, 1, 0.5]))
         return weight
 
     def colours(self, tone: Tone) -> NDArray[np.uint8]:
@@ -126,21 +126,23 @@ class Painter:
 
         flush = skin * [1.0, 0.82, 0.80]
         at = {k: self.mean[v] for k, v in self.points.items()}
-        for name, radius, amount in (("cheek", 0.018, 0.42), ("al", 0.008, 0.35), ("t", 0.02, 0.3)):
+        for name, radius, amount in (("cheek", 0.018, 0.34), ("al", 0.008, 0.30), ("t", 0.02, 0.2)):
             for side in ("left", "right"):
                 mix(tone.blood * amount * blob(self.mean, at[name, side], radius), flush)
-        mix(tone.blood * 0.5 * blob(self.mean, at["prn", "mid"], 0.011), flush)
+        mix(tone.blood * 0.4 * blob(self.mean, at["prn", "mid"], 0.011), flush)
         mix(tone.blood * 0.25 * blob(self.mean, at["pg", "mid"], 0.014), flush)
-        mix(0.55 * self.ears * tone.blood, skin * [0.99, 0.76, 0.73])
+        mix(0.42 * self.ears * tone.blood, skin * [0.99, 0.76, 0.73])
         mix(0.30 * self.lids, skin * [0.86, 0.78, 0.78])
         mix(0.8 * smooth_step(self.lips, 0.1, 0.85), tone.lips)
         mix(0.8 * smooth_step(self.slit, 0.3, 1.0), np.array(tone.lips) * [0.62, 0.50, 0.50])
+        for side in ("left", "right"):  # else a pale speck catches the light beside the mouth
+            mix(0.45 * blob(self.mean, at["ch", side], 0.0022), np.array(tone.lips) * 0.75)
         mix(0.78 * self.brows(tone.brow_width), tone.brows)
 
         eye = smooth_step(self.ball, 0.35, 0.75)
         mix(eye, (232.0, 226.0, 220.0))
         for side in ("left", "right"):  # the inner corner is pink
-            mix(eye * 0.6 * blob(self.mean, at["en", side], 0.0035), (205.0, 140.0, 130.0))
+            mix(eye * 0.6 * blob(self.mean, at["en", side], 0.006), (214.0, 150.0, 140.0))
         mm = 1000.0 * self.from_pupil
         iris = 1.0 - smooth_step(mm, IRIS_MM - 0.25, IRIS_MM + 0.25)
         rim = np.array(tone.iris) * 0.45
@@ -148,7 +150,7 @@ class Painter:
         depth = smooth_step(np.where(np.isfinite(mm), mm, 9.0), 3.6, 5.6)[:, None]
         mix(iris * eye, inner * (1 - depth) + rim * depth)
         mix((1.0 - smooth_step(mm, PUPIL_MM - 0.3, PUPIL_MM + 0.3)) * eye, (14.0, 11.0, 10.0))
-        lash = smooth_step(self.margin, 0.3, 0.9) * (0.35 + 0.5 * self.upper)
+        lash = smooth_step(self.margin, 0.3, 0.9) * (0.22 + 0.6 * self.upper)
         mix(lash, 0.35 * np.array(tone.brows) + 0.1 * skin)
         return np.clip(np.rint(colour), 0, 255).astype(np.uint8)
 

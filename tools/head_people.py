@@ -28,6 +28,7 @@ HEIGHT = ("minheight", "maxheight")
 YEARS_YOUNG, YEARS_OLD = 25.0, 90.0  # what "young" and "old" of the collection stand for
 MEAN_AGE = 0.25  # of the age parameter in `draw_people`: 41 years
 CUT = 2.2  # standard normals are cut here: beyond, single axes turn into caricatures
+LARGEST = 1.25  # amplitudes are cut here: the collection draws its shapes for 1
 SIDE_SD = 0.12  # of a pair's sd: how much left and right differ
 
 
@@ -151,7 +152,7 @@ def axis_weights(axes: Axes, people: People) -> Iterator[tuple[str, Array]]:
             right = [name.replace("/l-", "/r-") for name in (plus, minus)]
             sides = [(plus, minus, amplitude + apart), (right[0], right[1], amplitude - apart)]
         for up, down, value in sides:
-            cut = np.clip(value, -1.0, 1.0)
+            cut = np.clip(value, -LARGEST, LARGEST)
             yield up, np.maximum(cut, 0.0)
             if down:
                 yield down, np.maximum(-cut, 0.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import types
+from pathlib import Path
 
 os.environ.setdefault("PYOPENGL_PLATFORM", "osmesa")
 # pyrender's viewer wants a window system that a build machine may lack; it is never used here.
@@ -118,7 +119,7 @@ def montage(pictures: list[list[Picture]]) -> Picture:
     return np.vstack([np.hstack(row) for row in pictures])
 
 
-def save(path: str, picture: Picture) -> None:
+def save(path: Path, picture: Picture) -> None:
     """Write a picture (RGB)."""
     options = [cv2.IMWRITE_PNG_COMPRESSION, 9]
     if not cv2.imwrite(str(path), picture[..., ::-1], options):
