@@ -55,15 +55,16 @@ find_missing
 
 if [ -n "$packages" ] && [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
     export DEBIAN_FRONTEND=noninteractive
+    apt="apt-get -qq -o DPkg::Lock::Timeout=120"
     echo "apt-get install $packages"
-    apt-get -qq -o DPkg::Lock::Timeout=120 update || true
+    $apt update || true
     known=
     for package in $packages; do
         # Newer systems have no libosmesa6: EGL alone serves there.
         apt-cache show "$package" >/dev/null 2>&1 && known="$known $package"
     done
     # shellcheck disable=SC2086 # one word a package
-    apt-get -qq -o DPkg::Lock::Timeout=120 install -y --no-install-recommends $known </dev/null || true
+    $apt install -y --no-install-recommends $known </dev/null >/dev/null || true
     find_missing
 fi
 
