@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, read_only
 from ..camera import Camera, project
 from ..model import FaceModel, Scheme
-from ..observation import Observation, eye_distance
+from ..observation import FLATTEST, Observation, eye_distance
 from ..rotation import R0, axis_angle
 from .result import Fit, FitOptions, Status
 from .solve import Problem, Solution, solve
@@ -20,7 +22,6 @@ __all__ = ["Fit", "FitOptions", "Status", "fit"]
 NEAREST = 0.2  # metres: nearer fits put the nose of large faces behind the camera (MATH.md 1)
 FARTHEST = 1e6  # metres; beyond, ask for camera="orthographic"
 FIRST_KAPPA = 1.0  # per metre: where a free distance starts; no second basin in kappa was met (MATH.md 3)
-SPREAD = 1e-3  # smallest ratio of the second to the first singular value of the model's points
 
 
 def fit(
@@ -58,25 +59,68 @@ def fit(
     Joint Gauss-Newton on shape and camera with a box QP a step (fitting/solve.py), from a closed-form pose.
     """
     options = FitOptions(modes, box, noise_percent, prior_weight, tolerance, max_steps)
-    kappa = _kappa(camera, distance)
+    kappa = kappa_of(camera, distance)
+    task = prepare(model, observation, options)
+    free = camera == "perspective" and distance is None
+    return solve_from(task, start_pose(task.problem, kappa), np.zeros(task.problem.modes.shape[2]), free)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Task:
+    """An observation made ready for the solver: what every distance of a sweep shares."""
+
+    model: FaceModel
+    observation: Observation
+    options: FitOptions
+    problem: Problem
+    interocular_px: float
+    interocular_meaning: str
+
+
+def prepare(model: FaceModel, observation: Observation, options: FitOptions) -> Task:
+    """Visible points, their rows of the model and the prior's weight in px^2; ValueError if they do not belong together."""
     visible = observation.visible
     vertices = observation.vertices(model)
-    mean, Q = model.rows(vertices[visible] if not visible.all() else vertices)
-    _refuse_flat(mean)
-    Q = np.ascontiguousarray(Q[:, :, : min(modes, model.n_modes)])
+    mean, Q = landmark_rows(model, tuple(vertices[visible].tolist()))
+    Q = np.ascontiguousarray(Q[:, :, : min(options.modes, model.n_modes)])
     points = observation.points[visible] - observation.centre
-    start = pose_from_points(points, mean, np.linalg.pinv(mean - mean.mean(axis=0)).copy(), kappa)
-    interocular, meaning = _interocular(model, observation, start)
-    lam = prior_weight if prior_weight is not None else (noise_percent / 100 * interocular) ** 2
     weights = np.ones(len(points)) if observation.weights is None else observation.weights[visible]
-    problem = Problem(
-        points, weights, mean, Q, lam, np.inf if box is None else box, camera == "perspective" and distance is None
-    )
-    solution = solve(problem, start, np.zeros(Q.shape[2]), tolerance=tolerance, max_steps=max_steps)
-    return _answer(model, observation, options, solution, problem, interocular, meaning)
+    problem = Problem(points, weights, mean, Q, 0.0, np.inf if options.box is None else options.box)
+    interocular, meaning = _interocular(model, observation, problem)
+    lam = options.prior_weight
+    if lam is None:
+        lam = (options.noise_percent / 100 * interocular) ** 2  # MATH.md 3: the MAP estimate has lambda = sigma^2
+    return Task(model, observation, options, replace(problem, prior_weight=lam), interocular, meaning)
 
 
-def _kappa(camera: str, distance: float | None) -> float:
+@lru_cache(maxsize=64)
+def landmark_rows(model: FaceModel, vertices: tuple[int, ...]) -> tuple[Array, Array]:
+    """Mean (L, 3) and modes (L, 3, S) at landmark vertices, kept: a sweep or a page asks for the same ones again."""
+    mean, modes = model.rows(np.array(vertices, dtype=np.intp))
+    spread = np.linalg.svd(mean - mean.mean(axis=0), compute_uv=False)
+    if spread[1] <= FLATTEST * spread[0]:
+        raise ValueError("points: on the model they lie on one line, no pose can be found; add a point off the line")
+    return read_only(mean), read_only(modes)
+
+
+def start_pose(problem: Problem, kappa: float) -> Camera:
+    """The closed-form pose of the mean face at kappa = 1 / t_z."""
+    centred = problem.mean - problem.mean.mean(axis=0)
+    # The pseudo-inverse of the 3 x 3 normal matrix, not of the L x 3 one: landmarks in one plane are allowed
+    pinv = np.linalg.pinv(centred.T @ centred, hermitian=True) @ centred.T
+    return pose_from_points(problem.points, problem.mean, pinv, kappa)
+
+
+def solve_from(task: Task, camera: Camera, alpha: Array, free_distance: bool = False) -> Fit:
+    """The fit of a task from a given start, at the camera's distance or with the distance free."""
+    problem = replace(task.problem, free_distance=free_distance)
+    options = task.options
+    solution = solve(problem, camera, alpha, tolerance=options.tolerance, max_steps=options.max_steps)
+    return _answer(task, solution)
+
+
+def kappa_of(camera: str, distance: float | None) -> float:
+    """1 / t_z of a camera name and a distance in metres; ValueError out of range."""
     if camera not in ("perspective", "orthographic"):
         raise ValueError(f"camera: {camera!r} is not perspective or orthographic")
     if camera == "orthographic":
@@ -90,13 +134,7 @@ def _kappa(camera: str, distance: float | None) -> float:
     return 1.0 / distance
 
 
-def _refuse_flat(mean: Array) -> None:
-    spread = np.linalg.svd(mean - mean.mean(axis=0), compute_uv=False)
-    if spread[1] <= SPREAD * spread[0]:
-        raise ValueError("points: on the model they lie on one line, no pose can be found; add a point off the line")
-
-
-def _interocular(model: FaceModel, observation: Observation, start: Camera) -> tuple[float, str]:
+def _interocular(model: FaceModel, observation: Observation, problem: Problem) -> tuple[float, str]:
     """Distance of the eye centres in pixels and its definition.
 
     Measured on the observed points; where an eye corner is missing, on the mean face in the start's pose.
@@ -110,28 +148,21 @@ def _interocular(model: FaceModel, observation: Observation, start: Camera) -> t
     scheme = scheme or next(iter(model.schemes.values()), None)
     if scheme is None:
         raise ValueError("noise_percent: the model names no eyes to measure it by; give prior_weight instead")
+    start = start_pose(problem, 0.0)
     estimated = eye_distance(project(start, model.mean[scheme.vertices]), scheme)
     return estimated, f"{scheme.eyes_meaning}, of the mean face in the fitted pose (an eye corner is missing)"
 
 
-def _answer(
-    model: FaceModel,
-    observation: Observation,
-    options: FitOptions,
-    solution: Solution,
-    problem: Problem,
-    interocular: float,
-    meaning: str,
-) -> Fit:
-    camera = solution.camera
+def _answer(task: Task, solution: Solution) -> Fit:
+    camera, problem, observation = solution.camera, task.problem, task.observation
     residual = np.full(observation.points.shape, np.nan)
     v = problem.mean + problem.modes @ solution.alpha
     residual[observation.visible] = problem.points - project(camera, v)
     perspective = camera.kappa > 0
     return Fit(
-        model=model,
+        model=task.model,
         observation=observation,
-        options=options,
+        options=task.options,
         camera=camera,
         alpha=solution.alpha,
         rotation=axis_angle(camera.R @ R0),
@@ -141,8 +172,8 @@ def _answer(
         residual=residual,
         cost=solution.cost,
         prior_weight=problem.prior_weight,
-        interocular_px=interocular,
-        interocular_meaning=meaning,
+        interocular_px=task.interocular_px,
+        interocular_meaning=task.interocular_meaning,
         steps=solution.steps,
         status=solution.status,
     )
