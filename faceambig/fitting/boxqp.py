@@ -60,6 +60,8 @@ def solve_box_qp(
 
 
 def _solve(H: Array, g: Array) -> Array:
+    if not len(g):  # every variable on a bound
+        return g
     # H.T of a C-ordered symmetric matrix is the Fortran order LAPACK wants: no transposed copy
     _, d, info = lapack.dposv(H.T, g)
     if info != 0:
