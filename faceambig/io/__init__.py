@@ -1,0 +1,136 @@
+"""Readers: a file becomes a FaceModel or landmarks. Each is chosen by what the file holds, not by its name alone."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from ..arrays import Array
+from ..errors import AssetError
+from ..model import FaceModel
+from .ict import is_ict, read_ict
+from .landmarks import LandmarkFile, load_landmarks
+from .npz import asset_path, is_npz_model, read_npz, save_model
+
+__all__ = ["LandmarkFile", "load_landmarks", "load_model", "save_model"]
+
+# Millimetres on the mean of an adult model: ibug68 points of each end, lowest, highest. Six public
+# models lie within 87-93, 33-39 and 62-66; the ranges leave room for another population.
+ADULT = (
+    ("outer eye corners", ("37",), ("46",), 80.0, 100.0),
+    ("inner eye corners", ("40",), ("43",), 28.0, 44.0),
+    (
+        "eye centres",
+        ("37", "38", "39", "40", "41", "42"),
+        ("43", "44", "45", "46", "47", "48"),
+        56.0,
+        72.0,
+    ),
+)
+
+
+def load_model(
+    path: str | os.PathLike[str] = "embedded",
+    *,
+    part: Literal["face", "head"] = "face",
+    origin: Literal["eyes", "file"] = "eyes",
+) -> FaceModel:
+    """The model at `path`, in metres, +x the subject's left, +y up, +z out of the face.
+
+    Parameters
+    ----------
+    path: "embedded", the head that comes with faceambig; "ict", the folder named by FACEAMBIG_ICT; else a path: an
+        ICT-FaceKit folder (or its FaceXModel), or an .npz of faceambig.
+    part: "face", or "head" with the back of the head, where the file has both.
+    origin: "eyes", the middle between the eyes of the mean (mean of their four corners), so that a distance means the
+        same in every model; "file" keeps the file's own. `model.file_origin` says where the file's own lies.
+
+    Raises
+    ------
+    AssetError: nothing readable there, a damaged file, or a face of impossible size (a wrong unit).
+    ValueError: another `part` or `origin`.
+    """
+    if part not in ("face", "head"):
+        raise ValueError(f"part: {part!r} is not face or head")
+    if origin not in ("eyes", "file"):
+        raise ValueError(f"origin: {origin!r} is not eyes or file")
+    model = _read(_located(path), part)
+    _check_size(model)
+    shift = model.file_origin if origin == "file" else _between_the_eyes(model)
+    return _moved(model, shift)
+
+
+def _located(path: str | os.PathLike[str]) -> Path:
+    if path == "embedded":
+        return asset_path("head.npz")
+    if path == "ict":
+        folder = os.environ.get("FACEAMBIG_ICT")
+        if not folder:
+            raise AssetError("ict: set FACEAMBIG_ICT to the folder that holds FaceXModel/")
+        return Path(folder)
+    return Path(path)
+
+
+def _read(path: Path, part: str) -> FaceModel:
+    if not path.exists():
+        raise AssetError(f"{path}: no such file or folder; a path, embedded or ict is accepted")
+    if is_ict(path):
+        return read_ict(path, part=part)
+    if is_npz_model(path):
+        return read_npz(path)
+    raise AssetError(
+        f"{path}: not a model; an ICT-FaceKit folder (with FaceXModel/) or an .npz of faceambig is accepted"
+    )
+
+
+def _check_size(model: FaceModel) -> None:
+    """Refuse a mean face in the wrong unit. Never rescaled silently: absolute size is information."""
+    if "ibug68" not in model.schemes:
+        return
+    for what, right, left, low, high in ADULT:
+        gap = _centre(model, left) - _centre(model, right)
+        mm = 1000.0 * float(np.linalg.norm(gap))
+        if not low <= mm <= high:
+            hint = next(
+                (
+                    f"; {mm * 10.0**k:.4g} mm in a unit 10^{k} times as large: wrong unit?"
+                    for k in range(-6, 7)
+                    if low <= mm * 10.0**k <= high
+                ),
+                "",
+            )
+            raise AssetError(
+                f"{model.name}: {what} of the mean are {mm:.4g} mm apart, an adult's {low:g} to {high:g}{hint}"
+            )
+
+
+def _centre(model: FaceModel, names: tuple[str, ...]) -> Array:
+    scheme = model.schemes["ibug68"]
+    rows = [scheme.points.index(name) for name in names]
+    return model.mean[scheme.vertices[rows]].mean(axis=0)
+
+
+def _between_the_eyes(model: FaceModel) -> Array:
+    scheme = model.schemes.get("ibug68") or next(iter(model.schemes.values()), None)
+    if scheme is None:
+        raise AssetError(
+            f"{model.name}: names no eyes to put the origin between; use origin='file'"
+        )
+    right, left = (model.mean[scheme.vertices[list(rows)]].mean(axis=0) for rows in scheme.eyes)
+    return 0.5 * (right + left)
+
+
+def _moved(model: FaceModel, origin: Array) -> FaceModel:
+    """`model` with its coordinates counted from `origin` (3,), metres."""
+    if not origin.any():
+        return model
+    return replace(
+        model,
+        control_mean=model.control_mean - origin,
+        subjects=tuple(replace(s, vertices=s.vertices - origin) for s in model.subjects),
+        file_origin=model.file_origin - origin,
+    )
