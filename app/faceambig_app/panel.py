@@ -1,0 +1,129 @@
+"""Panel: the widgets of one room. They say what a person changed; show() writes what is. They know no scene and no fit.
+
+Sliders are linear in viser, so a distance is a slider over whole steps of 2.9 % with the centimetres as marks, and a
+number field beside it for exact values.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import viser
+
+from .state import FIELDS, Field, ViewState, clamp
+from .text import say
+
+Say = Callable[[dict[str, Any]], None]
+Refuse = Callable[[str], None]
+Listener = Callable[[viser.GuiEvent[Any]], Awaitable[None]]
+
+STEPS_PER_OCTAVE = 24.0  # of a distance slider: 2.9 % a step
+MARKS_CM = (20, 30, 60, 120, 240)
+VIEWS = FIELDS["view"].choices
+PATIENCE = 1.0  # seconds a number out of range may stand: "6" of "60" is on its way, not wrong
+
+
+class Panel:
+    """The widgets of one room."""
+
+    def __init__(
+        self, gui: viser.GuiApi, state: ViewState, people: tuple[str, ...], say_change: Say, doubt: Callable[[str, Any], None]
+    ) -> None:
+        self._gui, self._say, self._doubt = gui, say_change, doubt
+        self._people = people
+        self._shown = state
+        self._build_distance(state)
+
+    def _build_distance(self, state: ViewState) -> None:
+        self._distance = self._distance_slider("distance", state.distance)
+        self._distance_cm = self._gui.add_number(
+            say("field.distance_cm"), round(100 * state.distance, 1), step=0.1, hint=say("field.distance_cm_hint")
+        )
+        self._distance_cm.on_update(self._number_heard("distance", scale=0.01))
+
+    def build_rest(self, state: ViewState) -> None:
+        """The controls below the numbers and plots."""
+        self._subject = self._gui.add_dropdown(
+            say("field.subject"), self._people, initial_value=self._people[state.subject - 1], hint=say("field.subject_hint")
+        )
+        self._subject.on_update(self._heard("subject", lambda name: self._people.index(name) + 1))
+        self._actual = self._distance_slider("actual", state.actual)
+        self._view = self._gui.add_button_group(
+            say("field.view"), tuple(say(f"view.{name}") for name in VIEWS), hint=say("field.view_hint")
+        )
+        by_label = {say(f"view.{name}"): name for name in VIEWS}
+        self._view.on_click(self._heard("view", by_label.__getitem__))
+        with self._gui.add_folder(say("folder.pose"), expand_by_default=False):
+            self._pose = {name: self._linear_slider(name, getattr(state, name)) for name in ("yaw", "pitch", "roll")}
+        with self._gui.add_folder(say("folder.flex"), expand_by_default=False):
+            self._flex = self._linear_slider("flex", state.flex)
+            zero = self._gui.add_button(say("flex.zero"))
+            zero.on_click(self._heard("flex", lambda _: 0.0))
+            self.flex_words = self._gui.add_html("")
+
+    @property
+    def index_sliders(self) -> tuple[str, str]:
+        """Identifiers of the sliders whose own number box shows a step, not a value: the page hides those boxes."""
+        return self._distance._impl.uuid, self._actual._impl.uuid
+
+    def show(self, state: ViewState) -> None:
+        """Write a state into the widgets. On the event loop only, so a newer value is never overwritten by an older one."""
+        self._shown = state
+        self._distance.value = to_step(FIELDS["distance"], state.distance)
+        if abs(self._distance_cm.value - 100 * state.distance) > 0.05:
+            self._distance_cm.value = round(100 * state.distance, 1)
+        self._actual.value = to_step(FIELDS["actual"], state.actual)
+        self._subject.value = self._people[state.subject - 1]
+        for name, handle in self._pose.items():
+            handle.value = getattr(state, name)
+        self._flex.value = state.flex
+
+    def _distance_slider(self, name: str, value: float) -> viser.GuiSliderHandle[int]:
+        field = FIELDS[name]
+        marks = [cm for cm in (*MARKS_CM, 500) if field.low <= cm / 100 <= field.high]
+        handle = self._gui.add_slider(
+            say(f"field.{name}"), 0, to_step(field, field.high), 1, to_step(field, value),
+            marks=tuple((to_step(field, cm / 100), str(cm)) for cm in marks), hint=say(f"field.{name}_hint"),
+        )  # fmt: skip
+        handle.on_update(self._heard(name, lambda step: from_step(field, step)))
+        return handle
+
+    def _linear_slider(self, name: str, value: float) -> viser.GuiSliderHandle[float]:
+        field = FIELDS[name]
+        handle = self._gui.add_slider(
+            say(f"field.{name}"), float(field.low), float(field.high), float(field.step), float(value), hint=say(f"field.{name}_hint")
+        )
+        handle.on_update(self._heard(name, float))
+        return handle
+
+    def _heard(self, name: str, read: Callable[[Any], Any]) -> Listener:
+        async def heard(event: viser.GuiEvent[Any]) -> None:  # async: on the loop, in message order
+            if event.client_id is not None:  # None: written by show()
+                self._say({name: read(event.target.value)})
+
+        return heard
+
+    def _number_heard(self, name: str, scale: float) -> Listener:
+        async def heard(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is None:
+                return
+            value = event.target.value
+            near, differs = clamp(FIELDS[name], scale * value)
+            if differs:
+                self._doubt(name, value)
+            else:
+                self._say({name: near})
+
+        return heard
+
+
+def to_step(field: Field, metres: float) -> int:
+    """Nearest step of a distance slider."""
+    return round(STEPS_PER_OCTAVE * math.log2(metres / field.low))
+
+
+def from_step(field: Field, step: float) -> float:
+    """Metres at a step of a distance slider, to a tenth of a centimetre; the last step is the end of the range."""
+    return min(field.high, round(field.low * 2 ** (float(step) / STEPS_PER_OCTAVE), 3))

@@ -1,0 +1,230 @@
+"""ViewState -> Frame: observation, fit, bend and Scene, each a pure function of the part of the state it needs.
+
+Each step is memoised and bounded, shared by every browser: thirty pupils in one lesson cost one fit, and moving the
+view never refits. Every fit starts from the closed-form pose of its own points, never from the last frame, so a face
+does not depend on the way the slider took.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+import faceambig as fa
+from faceambig.camera import Camera
+from faceambig.compose import Face, compose, compose_row, curves, measure, photo
+from faceambig.flex import FlexibilityModes, plausible_limit
+from faceambig.model import FaceModel, Subject
+from faceambig.observation import portrait_camera
+from faceambig.scene import Curves, Photo, Scene
+
+from .state import Bend, Fitting, Look, Target, ViewState
+from .text import centimetres, distance_text, percent_number, say
+
+ROW_DISTANCES = (0.3, 0.6, 1.2, 2.4)  # metres, of the strip of faces
+MODEL_DEFAULT = "embedded"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Photograph:
+    """A synthetic photograph: who, with which camera, and the points it gave."""
+
+    subject: Subject
+    observation: fa.Observation
+    camera: Camera
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """What one browser shows now."""
+
+    state: ViewState
+    scene: Scene
+    flex_reach: tuple[float, float]  # mm along mode A that give plausible faces
+
+
+@lru_cache(maxsize=4)
+def model(name: str) -> FaceModel:
+    """The model of a name or path, loaded once."""
+    return fa.load_model(name)
+
+
+@lru_cache(maxsize=256)
+def photograph(target: Target) -> Photograph:
+    """The synthetic photograph of a target."""
+    subject = model(target.model).subject(target.subject)
+    pose = {"scheme": target.scheme, "yaw_deg": target.yaw, "pitch_deg": target.pitch, "roll_deg": target.roll}
+    observation = fa.observe(
+        subject, distance=target.actual, noise_percent=target.noise, seed=target.seed, **pose
+    )
+    return Photograph(subject, observation, portrait_camera(subject, distance=target.actual, **pose))
+
+
+@lru_cache(maxsize=2048)
+def fitted(target: Target, fitting: Fitting) -> fa.Fit:
+    """The fit of a target's points."""
+    taken = photograph(target)
+    return fa.fit(
+        taken.subject.model,
+        taken.observation,
+        camera="perspective" if fitting.distance is not None else "orthographic",
+        distance=fitting.distance,
+        modes=fitting.modes,
+        box=fitting.box,
+        noise_percent=fitting.prior,
+    )
+
+
+@lru_cache(maxsize=256)
+def bending(target: Target, fitting: Fitting) -> FlexibilityModes:
+    """The most flexible mode of a fit."""
+    fit = fitted(target, fitting)
+    return fa.flexibility_modes(fit.model, fit, count=1)
+
+
+@lru_cache(maxsize=256)
+def face(target: Target, fitting: Fitting, bend: Bend) -> Face:
+    """The fitted face, bent, measured against the true one."""
+    fit = fitted(target, fitting)
+    subject = photograph(target).subject
+    if bend.flex == 0:
+        return measure(subject, fit)
+    modes = bending(target, fitting)
+    return measure(
+        subject,
+        fit,
+        bend.flex * modes.directions[0],
+        limit=plausible_limit(len(fit.alpha)),
+        flex_words=modes.words[0],
+        flex_mm=bend.flex,
+    )
+
+
+@lru_cache(maxsize=64)
+def curve(target: Target, fitting: Fitting) -> Curves:
+    """d_L and d_S of a target over all distances; the fitting's own distance plays no part."""
+    taken = photograph(target)
+    sweep = fa.sweep_distance(
+        taken.subject.model,
+        taken.observation,
+        modes=fitting.modes,
+        box=fitting.box,
+        noise_percent=fitting.prior,
+        tolerance=1e-6,  # d_L to 3e-6 points, d_S to 3e-4 mm: far below a pixel of the plot
+    )
+    return curves(taken.subject, sweep, target.actual)
+
+
+def frame(state: ViewState, *, with_curves: bool = True) -> Frame:
+    """Everything a browser shows of a state. with_curves=False leaves the plots out: they cost a sweep a target."""
+    if state.show == "row":
+        return Frame(state, row(state), (0.0, 0.0))
+    target, fitting = state.target, state.fitting
+    taken = photograph(target)
+    shown = face(target, fitting, state.bend)
+    scene = _scene(target, shown, state.look, curve_of(state) if with_curves else None, _note(taken, target))
+    reach = bending(target, fitting).reach(0) if with_curves or state.flex else (0.0, 0.0)
+    return Frame(state, scene, reach)
+
+
+def curve_of(state: ViewState) -> Curves:
+    """The curves of a state's target: the same for every assumed distance, so cached under none."""
+    return curve(state.target, state.fitting._replace(distance=None))
+
+
+def row(state: ViewState) -> Scene:
+    """The strip: the true head and the fits at ROW_DISTANCES, coloured by their difference."""
+    target = state.target
+    taken = photograph(target)
+    faces = [face(target, state.fitting._replace(distance=d), state.bend) for d in ROW_DISTANCES]
+    titles = [say("head.true"), *(say("head.assumed", distance=centimetres(d)) for d in ROW_DISTANCES)]
+    captions = [((_taken(target), "dim"),)]
+    captions += [
+        (
+            (f"{say('number.d_l').lower()} {percent_number(f.d_l_percent)}\u202f%", "d_l"),
+            (f"{say('number.d_s').lower()} {f.d_s_mm:.1f}\u202fmm", "d_s"),
+        )
+        for f in faces
+    ]
+    return compose_row(
+        taken.subject,
+        faces,
+        picture(target),
+        titles=titles,
+        captions=captions,
+        legend_words=(say("legend.difference"), say("legend.unmeasured")),
+        note=_note(taken, target),
+    )
+
+
+def snapshot(
+    state: ViewState, path: str | Path | None = None, *, width: int | None = None, height: int | None = None
+) -> np.ndarray:
+    """The page's picture of a state, drawn off-screen: (H, W, 4) uint8 RGBA, and a PNG file if `path` is given."""
+    from faceambig.render.overlay import draw, encode_png  # pyrender and OpenCV only when a picture is asked for
+
+    picture = draw(frame(state).scene, width, height)
+    if path is not None:
+        write(Path(path), encode_png(picture, {"Software": "faceambig", "ViewState": state_json(state)}))
+    return picture
+
+
+def state_json(state: ViewState) -> str:
+    """The state as JSON, defaults left out."""
+    import msgspec
+
+    return msgspec.json.encode(state).decode()
+
+
+def write(path: Path, data: bytes) -> None:
+    """The whole file or nothing: beside it first, then in its place. ValueError if the folder is missing."""
+    if not path.parent.is_dir():
+        raise ValueError(f"out: there is no folder {str(path.parent)!r}")
+    beside = path.with_name(f".{path.name}.part")
+    try:
+        beside.write_bytes(data)
+        beside.replace(path)
+    except OSError as error:
+        beside.unlink(missing_ok=True)
+        raise ValueError(f"out: cannot write {str(path)!r}: {error.strerror}") from error
+
+
+def _scene(target: Target, shown: Face, look: Look, plot: Curves | None, note: str) -> Scene:
+    taken = photograph(target)
+    return compose(
+        taken.subject,
+        shown,
+        picture(target),
+        titles=(say("head.true"), say("head.fit")),
+        view=look.view,
+        surface=look.surface,
+        curve=plot,
+        legend_words=(say("legend.difference"), say("legend.unmeasured")),
+        note=note,
+    )
+
+
+@lru_cache(maxsize=64)
+def picture(target: Target) -> Photo:
+    """The photograph of a target, without a fit's points."""
+    taken = photograph(target)
+    caption = say("app.taken", distance=distance_text(target.actual))
+    return photo(taken.subject, taken.observation, taken.camera, caption=caption)
+
+
+def _taken(target: Target) -> str:
+    return f"photo {say('app.taken', distance=centimetres(target.actual))}"
+
+
+def _note(taken: Photograph, target: Target) -> str:
+    noise = say("note.noise", percent=f"{target.noise:g}") if target.noise else say("note.noise_free")
+    return say(
+        "note.snapshot",
+        points=len(taken.observation.points),
+        model=taken.subject.model.name,
+        subject=taken.subject.name,
+        noise=noise,
+    )

@@ -1,0 +1,140 @@
+"""Room: one browser and its newest state. Dispatcher: which room is computed next. All threads and timers live here.
+
+A widget's handler changes the room's state and rings; a worker takes the room that waits longest, reads its state once,
+computes and draws. A room waits at most once and is served by one worker at a time, so nothing queues, no old frame
+lands after a new one, and the newest state wins.
+
+While values keep coming the room draws drafts (coarse mesh, no curves); after REST seconds of silence it draws in full.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import threading
+import time
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from .state import ViewState, changed
+
+REST = 0.2  # seconds without a change before the full mesh is drawn
+WORKERS = 2  # measured: one was not better than two, and Python holds the interpreter's lock beyond
+
+
+class Painter(Protocol):
+    """What a room draws on."""
+
+    def draw(self, state: ViewState, draft: bool) -> None:
+        """Compute and draw a state; called by one worker at a time."""
+
+    def refuse(self, error: Exception) -> None:
+        """Say why a state could not be drawn; the last good frame stays."""
+
+
+class Room:
+    """One browser: the newest ViewState, and nothing derived from it."""
+
+    def __init__(self, state: ViewState, painter: Painter, ring: Callable[[Room, float], None]) -> None:
+        self.state = state
+        self.left = False
+        self._painter, self._ring = painter, ring
+        self._changed_at = 0.0  # monotonic seconds
+        self._resting: ViewState | None = None  # the state that was last drawn in full
+
+    def hear(self, values: dict[str, Any]) -> None:
+        """Take a change of some fields, already in range. Called on the event loop only: one writer, in message order."""
+        self.go(changed(self.state, **values))
+
+    def go(self, state: ViewState) -> None:
+        """Make `state` the newest and ask to be served."""
+        if state == self.state:
+            return
+        self.state = state
+        self._changed_at = time.monotonic()
+        self._ring(self, 0.0)
+
+    def open(self) -> None:
+        """Ask for the first frame, in full."""
+        self._ring(self, 0.0)
+
+    def serve(self) -> None:
+        """Draw the newest state; a draft if it is young, with a full turn booked for when it has rested."""
+        if self.left:
+            return
+        state = self.state
+        wait = self._changed_at + REST - time.monotonic()
+        draft = wait > 0
+        if not draft and state == self._resting:
+            return
+        try:
+            self._painter.draw(state, draft)
+        except Exception as error:  # noqa: BLE001  anything may go wrong in a fit; the worker and the last frame must survive
+            if not self.left:
+                self._painter.refuse(error)
+            draft = False
+        self._resting = None if draft else state
+        if draft:
+            self._ring(self, wait)
+
+
+class Dispatcher:
+    """Serves rooms by a few worker threads, the longest waiting first."""
+
+    def __init__(self, serve: Callable[[Any], None] = Room.serve, workers: int = WORKERS) -> None:
+        self._serve = serve
+        self._changed = threading.Condition()
+        self._waiting: dict[Any, None] = {}  # used as a set that keeps order: the place in the line is kept
+        self._served: set[Any] = set()
+        self._later: list[tuple[float, int, Any]] = []  # (monotonic seconds, running number, room)
+        self._number = itertools.count()
+        self._closed = False
+        self._threads = [
+            threading.Thread(target=self._work, name=f"faceambig-worker-{n}", daemon=True) for n in range(workers)
+        ]
+        for thread in self._threads:
+            thread.start()
+
+    def ring(self, room: Any, after: float = 0.0) -> None:
+        """Ask that `room` be served, now or `after` seconds from now."""
+        with self._changed:
+            if after > 0:
+                heapq.heappush(self._later, (time.monotonic() + after, next(self._number), room))
+            else:
+                self._waiting.setdefault(room)
+            self._changed.notify()
+
+    def close(self) -> None:
+        """Stop the workers; a room being served is finished first."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+        for thread in self._threads:
+            thread.join(timeout=2.0)
+
+    def _work(self) -> None:
+        while True:
+            with self._changed:
+                while (room := self._next()) is None:  # the first who waits and is not being served
+                    if self._closed:
+                        return
+                    self._changed.wait(self._until_later())
+                if self._closed:
+                    return
+                del self._waiting[room]  # before the state is read: a ring from here on is a new turn
+                self._served.add(room)
+            try:
+                self._serve(room)
+            finally:
+                with self._changed:
+                    self._served.discard(room)
+                    self._changed.notify()
+
+    def _next(self) -> Any | None:
+        now = time.monotonic()
+        while self._later and self._later[0][0] <= now:
+            self._waiting.setdefault(heapq.heappop(self._later)[2])
+        return next((room for room in self._waiting if room not in self._served), None)
+
+    def _until_later(self) -> float | None:
+        return max(0.0, self._later[0][0] - time.monotonic()) if self._later else None
