@@ -1,1 +1,40 @@
-"""faceambig."""
+"""faceambig: fit a 3D morphable face model to one photograph's points, and see the faces the points leave open.
+
+After A. Bas and W. A. P. Smith, "What does 2D geometric information really tell us about 3D face shape?", IJCV 2019.
+
+    import faceambig as fa
+    model = fa.load_model("embedded")
+    obs = fa.observe(model.subject(3), distance=0.3)
+    fit = fa.fit(model, obs, distance=1.2)
+    fit.d_l_percent
+"""
+
+from __future__ import annotations
+
+from .errors import AssetError
+from .fitting import Fit, FitOptions, Status, fit
+from .flex import FlexibilityModes, flexibility_modes
+from .io import load_landmarks, load_model
+from .model import FaceModel, Scheme, Subject
+from .observation import Observation, observe
+from .sweep import Interval, Sweep, sweep_distance
+
+__all__ = [
+    "AssetError",
+    "FaceModel",
+    "Fit",
+    "FitOptions",
+    "FlexibilityModes",
+    "Interval",
+    "Observation",
+    "Scheme",
+    "Status",
+    "Subject",
+    "Sweep",
+    "fit",
+    "flexibility_modes",
+    "load_landmarks",
+    "load_model",
+    "observe",
+    "sweep_distance",
+]

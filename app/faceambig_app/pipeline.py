@@ -179,10 +179,17 @@ def state_json(state: ViewState) -> str:
     return msgspec.json.encode(state).decode()
 
 
-def write(path: Path, data: bytes) -> None:
-    """The whole file or nothing: beside it first, then in its place. ValueError if the folder is missing."""
+def writable(path: Path) -> None:
+    """ValueError if a file cannot be put at `path`: no such folder, or a folder itself."""
     if not path.parent.is_dir():
         raise ValueError(f"out: there is no folder {str(path.parent)!r}")
+    if path.is_dir():
+        raise ValueError(f"out: {str(path)!r} is a folder, not a file")
+
+
+def write(path: Path, data: bytes) -> None:
+    """The whole file or nothing: beside it first, then in its place. ValueError says why not."""
+    writable(path)
     beside = path.with_name(f".{path.name}.part")
     try:
         beside.write_bytes(data)

@@ -1,0 +1,261 @@
+"""faceambig on the command line: parse -> state or library call -> print. Text for people, --json for programs.
+
+Exit status 0: good; 1: the fit did not converge; 2: bad input, one line on stderr, never a traceback.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from .state import DEFAULT, FIELDS, ViewState, parse
+
+if TYPE_CHECKING:
+    import faceambig as fa
+
+GOOD, NOT_CONVERGED, BAD_INPUT = 0, 1, 2
+HELP = {
+    "subject": "synthetic person, counted from 1",
+    "actual": "where the photo was taken from, metres",
+    "distance": "distance the fit assumes, metres",
+    "camera": "camera of the fit",
+    "yaw": "turn of the head in the photo, degrees",
+    "pitch": "nod of the head in the photo, degrees",
+    "roll": "tilt of the head in the photo, degrees",
+    "scheme": "landmarks used",
+    "noise": "noise added to the points, %% of the eye distance",
+    "seed": "of the noise",
+    "modes": "shape modes of the fit",
+    "prior": "landmark noise the fit assumes, %% of the eye distance",
+    "box": "largest shape coefficient, standard deviations",
+    "flex": "millimetres along the first flexibility mode",
+    "show": "two heads, or the row of fits at 30 60 120 240 cm",
+    "surface": "colours of the fitted face",
+    "view": "where the viewer stands",
+}
+
+
+class Parser(argparse.ArgumentParser):
+    """argparse with errors of one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """One line on stderr, exit status 2."""
+        self.exit(BAD_INPUT, f"{self.prog}: {message}\n")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; returns the exit status."""
+    options = parser().parse_args(arguments)
+    try:
+        return options.run(options)
+    except (ValueError, OSError, RuntimeError) as error:  # AssetError and ServeError are among these
+        print(f"faceambig {options.command}: {one_line(error)}", file=sys.stderr)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        return 130
+
+
+def one_line(error: BaseException) -> str:
+    """The error's words on one line."""
+    if isinstance(error, OSError) and error.strerror and error.filename:
+        return f"{error.filename}: {error.strerror}"
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+def parser() -> Parser:
+    """All commands and their flags; those of a picture come from the field table."""
+    root = Parser(prog="faceambig", description="A photograph of a face does not fix the face.")
+    commands = root.add_subparsers(dest="command", required=True, parser_class=Parser, metavar="COMMAND")
+    _serve(commands.add_parser("serve", help="open the page on this machine"))
+    _snapshot(commands.add_parser("snapshot", help="draw the page's picture of a state, without a browser"))
+    _fit(commands.add_parser("fit", help="fit a face to the points of a photograph"))
+    _sweep(commands.add_parser("sweep", help="fit at many distances"))
+    return root
+
+
+def _serve(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--host", default="127.0.0.1", help="address to listen on; only this machine's own (default 127.0.0.1)")
+    command.add_argument("--port", type=int, default=8080, help="port (default 8080)")
+    command.set_defaults(run=run_serve)
+
+
+def _snapshot(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--out", required=True, metavar="FILE.png", help="where to write the picture")
+    command.add_argument("--width", type=int, metavar="PX", help="width of the picture")
+    command.add_argument("--height", type=int, metavar="PX", help="height of the picture")
+    command.add_argument("--model", default=DEFAULT.model, help="model name or path (default embedded)")
+    for field in FIELDS.values():
+        unit = f" [{field.low:g} to {field.high:g}]" if not field.choices else f" [{', '.join(field.choices)}]"
+        default = getattr(DEFAULT, field.name)
+        command.add_argument(
+            field.flag, dest=field.name, metavar=field.name.upper(), help=f"{HELP[field.name]}{unit} (default {default})"
+        )
+    command.set_defaults(run=run_snapshot)
+
+
+def _points(command: argparse.ArgumentParser) -> None:
+    command.add_argument("points", metavar="FILE.pts", help="landmarks of the photograph (68 points of iBUG)")
+    command.add_argument("--model", default="embedded", help="model name or path (default embedded)")
+    command.add_argument("--image-size", metavar="WxH", help="size of the picture in pixels, if it does not lie beside the points")
+    command.add_argument("--modes", type=int, default=70, help="shape modes used (default 70)")
+    command.add_argument("--box", type=float, default=2.0, help="largest shape coefficient, sd (default 2)")
+    command.add_argument("--prior", type=float, default=1.0, help="landmark noise assumed, %% of the eye distance (default 1)")
+    command.add_argument("--json", action="store_true", help="print JSON for programs")
+
+
+def _fit(command: argparse.ArgumentParser) -> None:
+    _points(command)
+    command.add_argument("--distance", type=float, metavar="M", help="assumed camera distance, metres; left out: fitted too")
+    command.add_argument("--camera", default="perspective", help="perspective or orthographic (default perspective)")
+    command.set_defaults(run=run_fit)
+
+
+def _sweep(command: argparse.ArgumentParser) -> None:
+    _points(command)
+    command.add_argument("--from", dest="low", type=float, default=0.2, metavar="M", help="nearest distance (default 0.2)")
+    command.add_argument("--to", dest="high", type=float, default=3.0, metavar="M", help="farthest distance (default 3)")
+    command.add_argument("--steps", type=int, default=13, help="distances, evenly in ratio (default 13)")
+    command.set_defaults(run=run_sweep)
+
+
+def run_serve(options: argparse.Namespace) -> int:
+    """Serve the page until interrupted."""
+    from .server import serve
+
+    return serve(options.host, options.port)
+
+
+def run_snapshot(options: argparse.Namespace) -> int:
+    """Draw a state off-screen."""
+    state = state_of(options)
+    for side in (options.width, options.height):
+        if side is not None and not 64 <= side <= 8192:
+            raise ValueError(f"width, height: {side} is not within 64 to 8192 pixels")
+    from pathlib import Path
+
+    from .pipeline import snapshot, writable
+
+    writable(Path(options.out))  # before the work, not after it
+    snapshot(state, options.out, width=options.width, height=options.height)
+    return GOOD
+
+
+def state_of(options: argparse.Namespace) -> ViewState:
+    """The state of the flags given."""
+    given = {name: parse(field, getattr(options, name)) for name, field in FIELDS.items() if getattr(options, name) is not None}
+    return ViewState(model=options.model, **given)
+
+
+def run_fit(options: argparse.Namespace) -> int:
+    """Fit a face to the points of a file."""
+    import faceambig as fa
+
+    observation, notes = observation_of(options)
+    fit = fa.fit(
+        fa.load_model(options.model), observation, camera=options.camera, distance=options.distance,
+        modes=options.modes, box=options.box, noise_percent=options.prior,
+    )  # fmt: skip
+    if options.json:
+        print(json.dumps(fit_record(fit) | notes))
+    else:
+        where = "far away (orthographic)" if fit.distance is None else f"{100 * fit.distance:.3g} cm"
+        print(f"{fit.status}: camera at {where}, landmark error d_L {fit.d_l_percent:.2f} % of the interocular distance")
+        print(f"interocular distance: {fit.interocular_px:.1f} px, {fit.interocular_meaning}")
+        print(f"principal point: {notes['principal_point']}; picture size: {notes['image_size_from']}")
+    return GOOD if fit.converged else NOT_CONVERGED
+
+
+def run_sweep(options: argparse.Namespace) -> int:
+    """Fit at many distances and with the far-away camera."""
+    import numpy as np
+
+    import faceambig as fa
+
+    if not 0.2 <= options.low <= options.high or not 1 <= options.steps <= 1000:
+        raise ValueError(
+            f"--from {options.low:g} --to {options.high:g} --steps {options.steps}: "
+            "from at least 0.2 m up to `to`, 1 to 1000 steps"
+        )
+    observation, notes = observation_of(options)
+    sweep = fa.sweep_distance(
+        fa.load_model(options.model), observation, np.geomspace(options.low, options.high, options.steps),
+        modes=options.modes, box=options.box, noise_percent=options.prior,
+    )  # fmt: skip
+    interval = sweep.interval()
+    fits = (*sweep.fits, sweep.orthographic)
+    if options.json:
+        span = {"low_m": interval.low, "high_m": interval.high, "empty": interval.empty, "tolerance_percent": interval.tolerance_percent}
+        print(json.dumps({"fits": [fit_record(fit) for fit in fits], "interval": span} | notes))
+    else:
+        print("distance cm   d_L %   status")
+        for fit in fits:
+            name = "orthographic" if fit.distance is None else f"{100 * fit.distance:.4g}"
+            print(f"{name:>12} {fit.d_l_percent:7.3f}   {fit.status}")
+        print(interval_words(interval))
+        print(f"interocular distance: {fits[0].interocular_px:.1f} px, {fits[0].interocular_meaning}")
+        print(f"principal point: {notes['principal_point']}; picture size: {notes['image_size_from']}")
+    return GOOD if all(fit.converged for fit in fits) else NOT_CONVERGED
+
+
+def interval_words(interval: fa.Interval) -> str:
+    """The distances a tolerance cannot tell apart, as a sentence."""
+    tolerance = f"{interval.tolerance_percent:g} %"
+    if interval.empty:
+        return f"no distance brings d_L under {tolerance}: the best is {interval.best_d_l_percent:.2f} %"
+    low = "the nearest tried" if interval.low is None else f"{100 * interval.low:.3g} cm"
+    high = "infinity" if interval.high is None else f"{100 * interval.high:.3g} cm"
+    return f"d_L stays under {tolerance} from {low} to {high}: within it the points do not tell the distance"
+
+
+def observation_of(options: argparse.Namespace) -> tuple[fa.Observation, dict[str, Any]]:
+    """The points of a file, and what was assumed about their picture."""
+    import faceambig as fa
+
+    read = fa.load_landmarks(options.points, image_size=image_size(options.image_size))
+    observation = fa.Observation(read.points, read.scheme, image_size=read.image_size)
+    cx, cy = observation.centre
+    notes = {
+        "points_used": int(observation.visible.sum()),
+        "principal_point": f"({cx:g}, {cy:g}), {observation.centre_meaning}",
+        "image_size_from": read.image_size_from,
+    }
+    return observation, notes
+
+
+def image_size(text: str | None) -> tuple[int, int] | None:
+    """(width, height) of "640x480"."""
+    if text is None:
+        return None
+    width, cross, height = text.lower().partition("x")
+    if not (cross and width.isdigit() and height.isdigit() and int(width) and int(height)):
+        raise ValueError(f"--image-size: {text!r} is not like 640x480")
+    return int(width), int(height)
+
+
+def fit_record(fit: fa.Fit) -> dict[str, Any]:
+    """A fit as JSON: metres, pixels, radians, names as in Python."""
+    camera = {"focal_px": fit.focal} if fit.focal is not None else {"scale": fit.scale}
+    return {
+        "status": str(fit.status),
+        "camera": "orthographic" if fit.distance is None else "perspective",
+        "distance_m": fit.distance,
+        **camera,
+        "rotation": fit.rotation.tolist(),
+        "translation_m": fit.translation.tolist(),
+        "alpha": fit.alpha.tolist(),
+        "cost": fit.cost,
+        "d_l_percent": fit.d_l_percent,
+        "d_l_unit": fit.interocular_meaning,
+        "steps": fit.steps,
+        "version": version(),
+    }
+
+
+def version() -> str:
+    """The installed version of faceambig."""
+    from importlib.metadata import version as installed
+
+    return installed("faceambig")
