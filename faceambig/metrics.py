@@ -165,32 +165,32 @@ def surface_difference(
     if len(x) < 3:
         raise ValueError(f"vertices: {len(x)} to compare; a motion needs 3")
     R, t, s, xc, yc = _align(x, y, scale)
-    gap = xc @ (s * R.T)
-    gap -= yc
-    distances = np.sqrt(np.einsum("ij,ij->i", gap, gap))
+    gap = np.subtract((s * R) @ xc, yc, out=yc)
+    gap *= gap
+    distances = gap.sum(axis=0)
+    np.sqrt(distances, out=distances)
     return SurfaceDifference(float(distances.mean()), distances, R, t, s)
 
 
 def _align(a: Array, b: Array, scale: bool) -> tuple[Array, Array, float, Array, Array]:
-    """R, t, s of `align`, and both point sets about their means."""
-    # A product with ones: 6 times faster than mean(axis=0) on rows of three
-    weight = np.full(len(a), 1.0 / len(a))
-    a_mean, b_mean = weight @ a, weight @ b
-    ac, bc = (
-        a - a_mean,
-        b - b_mean,
-    )  # centred first: the product alone loses digits far from the origin
-    U, D, Vt = np.linalg.svd(bc.T @ ac)
+    """R, t, s of `align`, and both point sets about their means, (3, N)."""
+    # One row per coordinate: NumPy's loops then run over N, not over 3. In place: at this size an
+    # array costs more to allocate than to fill.
+    ac, bc = np.array(a.T, order="C"), np.array(b.T, order="C")
+    a_mean, b_mean = ac.mean(axis=1), bc.mean(axis=1)
+    ac -= a_mean[:, None]  # centred first: far from the origin the product alone loses digits
+    bc -= b_mean[:, None]
+    U, D, Vt = np.linalg.svd(bc @ ac.T)
     if np.linalg.det(U) * np.linalg.det(Vt) < 0:
         U[:, 2] *= -1
         D[2] *= -1
     R = U @ Vt
     s = 1.0
     if scale:
-        size = np.einsum("ij,ij->", ac, ac)
+        size = float(np.vdot(ac, ac))
         if not size > 0:
             raise ValueError("source: all points are at one place, no scale fits")
-        s = float(D.sum() / size)
+        s = float(D.sum()) / size
     return R, b_mean - s * (R @ a_mean), s, ac, bc
 
 
