@@ -1,0 +1,78 @@
+"""Shared by all tests: one BLAS thread, hypothesis without a clock, and the models, loaded once a session."""
+
+# ruff: noqa: E402 - the number of threads is chosen before NumPy is loaded
+
+from __future__ import annotations
+
+import os
+import subprocess
+import tempfile
+from pathlib import Path
+
+# More BLAS threads than cores make a fit of 1 ms take a second
+for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(variable, "1")
+
+import platformdirs
+import pytest
+from hypothesis import settings
+
+import faceambig.io as fio
+from faceambig.model import FaceModel
+
+# The same examples on every run and machine: a failure is a change of the code, never of the weather
+settings.register_profile("ci", deadline=None, derandomize=True, max_examples=100)
+settings.load_profile("ci")
+
+NO_ICT = (
+    "no ICT-FaceKit: FACEAMBIG_ICT names no folder, ../shared/tools/unpack_ict.sh finds no archive"
+)
+
+
+def cache_folder() -> Path:
+    """The user's cache, where unpacked models survive between runs; else a temporary folder."""
+    try:
+        return platformdirs.user_cache_path("faceambig", ensure_exists=True)
+    except OSError:
+        return Path(tempfile.gettempdir()) / "faceambig"
+
+
+def ict_folder() -> Path | None:
+    """Where ICT-FaceKit lies, unpacked at the first call; None if it is not there."""
+    if named := os.environ.get("FACEAMBIG_ICT"):
+        return Path(named)
+    script = Path(__file__).resolve().parents[2] / "shared" / "tools" / "unpack_ict.sh"
+    if not script.is_file():
+        return None
+    done = subprocess.run(
+        ["bash", str(script), str(cache_folder() / "ict")],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode == 3:  # no archive
+        return None
+    if done.returncode:
+        raise RuntimeError(done.stderr.strip())
+    return Path(done.stdout.strip())
+
+
+@pytest.fixture(scope="session")
+def embedded() -> FaceModel:
+    """The embedded head."""
+    return fio.load_model("embedded")
+
+
+@pytest.fixture(scope="session")
+def ict_path() -> Path:
+    """The folder of ICT-FaceKit; skips without it."""
+    folder = ict_folder()
+    if folder is None:
+        pytest.skip(NO_ICT)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def ict(ict_path: Path) -> FaceModel:
+    """ICT-FaceKit's face part, origin between the eyes; skips without it."""
+    return fio.load_model(ict_path)
