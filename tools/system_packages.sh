@@ -33,17 +33,25 @@ has() {
     esac >/dev/null 2>&1
 }
 
-# The packages for what is missing, in $packages; a browser that apt cannot give, in $by_playwright.
+# What is missing, in $names; its packages, in $packages; a browser that apt cannot give, in $by_playwright.
 find_missing() {
-    packages= by_playwright=
+    names= packages= by_playwright=
     for need in $wanted; do
         has "$need" && continue
         case $need in
         venv) packages="$packages python3-venv" ;;
-        gl) packages="$packages $renderer" ;;
+        gl)
+            names="$names, software renderer (pictures)"
+            packages="$packages $renderer"
+            ;;
         browser)
             # Ubuntu has Chromium as a snap only, which cannot be steered from outside.
-            if [ "$system" = ubuntu ]; then by_playwright=yes; else packages="$packages chromium"; fi
+            if [ "$system" = ubuntu ]; then
+                by_playwright=yes
+            else
+                names="$names, Chromium (page tests)"
+                packages="$packages chromium"
+            fi
             ;;
         esac
     done
@@ -73,10 +81,10 @@ fi
 if [ -n "$packages" ]; then
     line="to type: sudo apt-get install -y $packages"
     case " $packages " in
-    *" python3-venv "*) stop "python3 cannot make a virtual environment; $line" ;;
-    *) echo "missing for pictures or page tests; $line" >&2 ;;
+    *" python3-venv "*) stop "$python cannot make a virtual environment; $line" ;;
+    *) echo "not found:${names#,}; $line" >&2 ;;
     esac
 fi
 if [ -n "$by_playwright" ]; then
-    echo "no Chromium for the page tests; to type: .venv/bin/playwright install --with-deps chromium" >&2
+    echo "not found: Chromium (page tests); to type: .venv/bin/playwright install --with-deps chromium" >&2
 fi
