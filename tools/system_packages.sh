@@ -58,6 +58,13 @@ find_missing() {
     packages=${packages# }
 }
 
+if command -v "$python" >/dev/null; then
+    "$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null ||
+        stop "faceambig needs Python 3.11 or newer, '$python' is not: make PY=/path/to/python3.11 ..."
+elif [ "$python" != python3 ]; then
+    stop "'$python' is not found: make PY=/path/to/python3.11 ..."
+fi
+
 system=$(. /etc/os-release 2>/dev/null && echo "${ID:-}") || system=
 find_missing
 
@@ -76,8 +83,6 @@ if [ -n "$packages" ] && [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; th
     find_missing
 fi
 
-"$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null ||
-    stop "faceambig needs Python 3.11 or newer and '$python' is not: make PY=/path/to/python3.11 ..."
 if [ -n "$packages" ]; then
     line="to type: sudo apt-get install -y $packages"
     case " $packages " in
