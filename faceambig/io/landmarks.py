@@ -176,9 +176,9 @@ def _parse_pts(lines: Sequence[str], file: str) -> Array:
                     raise AssetError(f"{file}: more than {MAX_POINTS} points")
         elif words == ["{"]:
             inside = True
-        elif match := re.fullmatch(r"\s*(version|n_points)\s*:\s*(\d{1,6})\s*", line):
-            count = int(match[2]) if match[1] == "n_points" else count
-        else:
+        elif match := re.fullmatch(r"n_points\s*:\s*(\d{1,6})", line.strip()):
+            count = int(match[1])
+        elif not re.fullmatch(r"version\s*:\s*\S+", line.strip()):
             raise AssetError(
                 f"line {number} of {file}: expected 'n_points: 68' or {{, found {line.strip()!r:.40}"
             )

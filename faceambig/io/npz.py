@@ -127,7 +127,8 @@ def read_npz(path: Path) -> FaceModel:
         members = _headers(archive)
         sizes = _agreed_sizes(members)
         arrays = {name: _array(archive, member) for name, member in members.items()}
-        return _built(arrays, sizes, path)
+        with np.errstate(over="ignore", invalid="ignore"):  # infinities are refused by name below
+            return _built(arrays, sizes, path)
 
 
 def save_model(model: FaceModel, path: str | os.PathLike[str]) -> None:
