@@ -25,14 +25,15 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-import head_paint as paint
 import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg, sparse
+
+import head_paint as paint
 from head_measures import end_vertices, holds, measure, read_survey, report
 from head_mesh import BaseMesh, add_eyes, build_base, catmull_clark, nearest_mirror, split_quads
 from head_people import ANCESTRIES, DATA, People, draw_people, make_generator, read_axes, read_table
 from head_source import Source, find_wheel
-from numpy.typing import NDArray
-from scipy import linalg, sparse
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -70,17 +71,19 @@ def make_head(source: Source, topology: dict) -> Head:
     base = build_base(source.vertices, source.quads, topology)
     operator, quads = catmull_clark(base.polygons, base.n_vertices)
     number = {int(v): n for n, v in enumerate(base.kept)}
-    balls = np.stack([
-        source.vertices[slice(topology[f"eyeball_{side}"][0], topology[f"eyeball_{side}"][1] + 1)]
-        for side in ("left", "right")
-    ])
+    balls = np.stack(
+        [
+            source.vertices[
+                slice(topology[f"eyeball_{side}"][0], topology[f"eyeball_{side}"][1] + 1)
+            ]
+            for side in ("left", "right")
+        ]
+    )
     neutral = add_eyes(base, source.vertices[None, base.kept], balls[None])[0]
     x, y, z = neutral.T
     ear = (np.abs(x) > 0.685) & (z < 0.62) & (y < 7.45)
     neck = (y < 6.75) & (z < 0.6)
-    farkas = {
-        (r["name"], r["side"]): number[int(r["vertex"])] for r in read_table("farkas.csv")
-    }
+    farkas = {(r["name"], r["side"]): number[int(r["vertex"])] for r in read_table("farkas.csv")}
     farkas["p", "left"], farkas["p", "right"] = base.pupils
     return Head(
         base=base,
@@ -256,13 +259,14 @@ def build(wheel: Path) -> tuple[dict[str, NDArray], Head, str, NDArray[np.bool_]
     painter = paint.Painter(head.base, head.operator, source, fine, head.farkas, head.ibug)
     region = paint.regions(painter)
     draws = np.random.default_rng(SUBJECT_SEED + 1).random((N_SUBJECTS, 4))
-    draws[:, 0] = (np.argsort(np.argsort(draws[:, 0])) + 0.5) / N_SUBJECTS  # spread evenly
-    tones = [
-        tone_of(a, s, d) for a, s, d in zip(others.ancestry, others.sex, draws, strict=True)
-    ]
+    main_ancestry = others.ancestry.argmax(axis=1)
+    for group in (main_ancestry == k for k in range(len(ANCESTRIES))):
+        rank = draws[group, 0].argsort().argsort()
+        draws[group, 0] = (rank + 0.5) / group.sum()  # tones spread evenly over each range
+    tones = [tone_of(a, s, d) for a, s, d in zip(others.ancestry, others.sex, draws, strict=True)]
     seen = paint.occlusion(fine, faces, head.mirror)
     operator = head.operator
-    assert len(fine) < 65_536  # noqa: S101  (faces and indices are uint16)
+    assert len(fine) < 65_536
     arrays = {
         "format": np.array("faceambig-model"),
         "version": np.array(1),
@@ -288,7 +292,7 @@ def build(wheel: Path) -> tuple[dict[str, NDArray], Head, str, NDArray[np.bool_]
         "subject_notes": np.array([describe(others, k) for k in range(N_SUBJECTS)]),
         "subject_colours": np.stack([painter.colours(t) for t in tones]),
         "population": np.array(N_PEOPLE),
-        "variance_held": held,
+        "variance_held": np.round(held, 9),
     }
     survey = read_survey()
     ends = end_vertices(survey, head.farkas)
@@ -319,16 +323,31 @@ def choose_subjects(drawn: People) -> People:
     return People(*(getattr(drawn, field)[chosen] for field in People.__dataclass_fields__))
 
 
+def compare(arrays: dict[str, NDArray], path: Path) -> int:
+    """Print which stored arrays differ from fresh ones; 0 if none does."""
+    with np.load(path) as stored:
+        for name, fresh in arrays.items():
+            if not np.array_equal(stored[name], fresh):
+                share = np.mean(stored[name] != fresh) if stored[name].shape == fresh.shape else 1.0
+                print(f"{name}: {share:.2e} of the entries differ")
+        same = all(np.array_equal(stored[name], fresh) for name, fresh in arrays.items())
+    print(f"{path}: {'equal to a fresh build' if same else 'not the same as a fresh build'}")
+    return 0 if same else 1
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description="Build assets/head.npz.")
     parser.add_argument("--wheel", type=Path, help="the wheel, if it is already on this machine")
     parser.add_argument("--out", type=Path, default=ASSETS, help="folder for head.npz and schemes")
     parser.add_argument("--pictures", action="store_true", help="also draw docs/head*.png")
+    parser.add_argument("--check", action="store_true", help="write nothing, compare with --out")
     options = parser.parse_args()
     began = time.perf_counter()
     arrays, head, table, good = build(find_wheel(options.wheel))
-    options.out.mkdir(parents=True, exist_ok=True)
     path = options.out / "head.npz"
+    if options.check:
+        return compare(arrays, path)
+    options.out.mkdir(parents=True, exist_ok=True)
     np.savez_compressed(path, **arrays)
     write_schemes(head, options.out / "schemes")
     packed = path.read_bytes()

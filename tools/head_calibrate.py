@@ -20,21 +20,23 @@ import json
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
 from build_head import DECIMETRE, make_head
 from head_measures import end_vertices, measure, read_survey, report
+from head_mesh import add_eyes
 from head_people import (
     DATA,
     Axes,
+    People,
     axis_weights,
     draw_people,
     macro_weights,
     make_generator,
     read_axes,
 )
-from head_mesh import add_eyes
 from head_source import Source, find_wheel
-from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 Array = NDArray[np.float64]
 
@@ -58,9 +60,12 @@ def main() -> None:
 
     fitted = np.flatnonzero(axes.fitted)
     place = {name: k for k, name in enumerate(generator.names)}
-    reach = np.array([  # millimetres of the largest shift at amplitude 1
-        100.0 * np.linalg.norm(generator.shifts[place[axes.plus[k]]], axis=1).max() for k in fitted
-    ])
+    reach = np.array(
+        [  # millimetres of the largest shift at amplitude 1
+            100.0 * np.linalg.norm(generator.shifts[place[axes.plus[k]]], axis=1).max()
+            for k in fitted
+        ]
+    )
     neutral_sd = 0.8 * np.minimum(0.40, TYPICAL_MM / reach)
 
     moving = [n for n, _ in axis_weights(subset(axes, fitted), people_subset(people, fitted))]
@@ -80,9 +85,7 @@ def main() -> None:
         balls = points[:, n_head:].reshape(N_PEOPLE, 2, -1, 3)
         shapes = DECIMETRE * add_eyes(head.base, points[:, :n_head], balls)
         flat = rows @ shapes.transpose(1, 0, 2).reshape(shapes.shape[1], -1)
-        return measure(
-            flat.reshape(*ends.shape, N_PEOPLE, 3).transpose(2, 0, 1, 3), survey.names
-        )
+        return measure(flat.reshape(*ends.shape, N_PEOPLE, 3).transpose(2, 0, 1, 3), survey.names)
 
     def apply(x: Array) -> Axes:
         mean, male, log_sd = x.reshape(3, -1)
@@ -104,20 +107,24 @@ def main() -> None:
         v = values(apply(x))
         apart = v[men].mean(axis=0) - v[~men].mean(axis=0)
         mean, male, log_sd = x.reshape(3, -1)
-        return np.concatenate([
-            (v.mean(axis=0) - survey.mean) / survey.sd / MEAN_TOL,
-            (apart - wanted) / survey.sd / MALE_TOL,
-            np.log(v.std(axis=0) / survey.sd) / SD_TOL,
-            mean / MEAN_MM,
-            male / MALE_MM,
-            log_sd / LOG_SD,
-        ])
+        return np.concatenate(
+            [
+                (v.mean(axis=0) - survey.mean) / survey.sd / MEAN_TOL,
+                (apart - wanted) / survey.sd / MALE_TOL,
+                np.log(v.std(axis=0) / survey.sd) / SD_TOL,
+                mean / MEAN_MM,
+                male / MALE_MM,
+                log_sd / LOG_SD,
+            ]
+        )
 
-    start = np.stack([
-        axes.mean[fitted] * reach,
-        axes.male[fitted] * reach,
-        np.log(axes.sd[fitted] / neutral_sd),
-    ]).ravel()
+    start = np.stack(
+        [
+            axes.mean[fitted] * reach,
+            axes.male[fitted] * reach,
+            np.log(axes.sd[fitted] / neutral_sd),
+        ]
+    ).ravel()
     step = np.repeat([0.3, 0.3, 0.1], len(fitted))
     # Millimetres, millimetres, log: bounds against the absurd; the ridge is what holds.
     low = np.repeat([-12.0, -4.0, -1.6], len(fitted))
@@ -145,17 +152,19 @@ def main() -> None:
 
 def subset(axes: Axes, keep: NDArray[np.int64]) -> Axes:
     """Only the kept axes."""
-    return Axes(**{
-        f.name: (
-            tuple(getattr(axes, f.name)[k] for k in keep)
-            if isinstance(getattr(axes, f.name), tuple)
-            else getattr(axes, f.name)[keep]
-        )
-        for f in dataclasses.fields(axes)
-    })
+    return Axes(
+        **{
+            f.name: (
+                tuple(getattr(axes, f.name)[k] for k in keep)
+                if isinstance(getattr(axes, f.name), tuple)
+                else getattr(axes, f.name)[keep]
+            )
+            for f in dataclasses.fields(axes)
+        }
+    )
 
 
-def people_subset(people, keep):  # noqa: ANN001, ANN201
+def people_subset(people: People, keep: NDArray[np.int64]) -> People:
     """The same people with the draws of the kept axes only."""
     return dataclasses.replace(people, z=people.z[:, keep], side=people.side[:, keep])
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from head_people import read_table
 from numpy.typing import NDArray
+
+from head_people import read_table
 
 Array = NDArray[np.float64]
 
@@ -50,10 +51,12 @@ def end_vertices(survey: Survey, points: dict[tuple[str, str], int]) -> NDArray[
     pairs = []
     for first, second in survey.ends:
         sides = ("right", "left") if first == second else ("right", "right")
-        pairs.append([
-            points[name, side] if (name, side) in points else points[name, "mid"]
-            for name, side in zip((first, second), sides, strict=True)
-        ])
+        pairs.append(
+            [
+                points[name, side] if (name, side) in points else points[name, "mid"]
+                for name, side in zip((first, second), sides, strict=True)
+            ]
+        )
     return np.array(pairs)
 
 

@@ -7,6 +7,7 @@ the right eye's, each ring by ring from the lid to the pupil.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,9 +58,7 @@ def nearest_mirror(vertices: Array, tolerance: float) -> Ints:
 
 def flood(quads: Ints, seed: int, loops: list[list[int]]) -> Ints:
     """The quads reached from a vertex without crossing an edge of the loops."""
-    closed = {
-        frozenset(e) for loop in loops for e in zip(loop, loop[1:] + loop[:1], strict=True)
-    }
+    closed = {frozenset(e) for loop in loops for e in zip(loop, loop[1:] + loop[:1], strict=True)}
     by_edge: dict[frozenset[int], list[int]] = {}
     for number, quad in enumerate(quads.tolist()):
         for edge in zip(quad, quad[1:] + quad[:1], strict=True):
@@ -100,7 +99,7 @@ def patch_polygons(loop: list[int], first: int) -> list[tuple[int, ...]]:
         list(range(first + k * N_LOOP, first + (k + 1) * N_LOOP)) for k in range(1 + len(RINGS_MM))
     ]
     polygons: list[tuple[int, ...]] = []
-    for outer, inner in zip(rings, rings[1:], strict=False):
+    for outer, inner in pairwise(rings):
         for i in range(N_LOOP):
             j = (i + 1) % N_LOOP
             polygons.append((outer[i], outer[j], inner[j], inner[i]))
@@ -192,16 +191,12 @@ def add_eyes(base: BaseMesh, head: Array, balls: Array) -> Array:
     return np.concatenate(parts, axis=1)
 
 
-def catmull_clark(
-    polygons: tuple[tuple[int, ...], ...], n: int
-) -> tuple[sparse.csr_array, Ints]:
+def catmull_clark(polygons: tuple[tuple[int, ...], ...], n: int) -> tuple[sparse.csr_array, Ints]:
     """One step: operator (N, n) whose rows sum to 1, and the quads (Q, 4) of the fine mesh.
 
     Fine vertices: the n old ones (same numbers), then one per edge, then one per polygon.
     """
-    edges = sorted({
-        (min(e), max(e)) for p in polygons for e in zip(p, p[1:] + p[:1], strict=True)
-    })
+    edges = sorted({(min(e), max(e)) for p in polygons for e in zip(p, p[1:] + p[:1], strict=True)})
     edge_number = {e: k for k, e in enumerate(edges)}
     n_edges, n_faces = len(edges), len(polygons)
 
@@ -210,11 +205,13 @@ def catmull_clark(
     share = np.concatenate([np.full(len(p), 1.0 / len(p)) for p in polygons])
     face_points = sparse.csr_array((share, (rows, columns)), shape=(n_faces, n))
 
-    touching = np.array([  # (edge, face) incidences
-        (edge_number[min(e), max(e)], k)
-        for k, p in enumerate(polygons)
-        for e in zip(p, p[1:] + p[:1], strict=True)
-    ])
+    touching = np.array(
+        [  # (edge, face) incidences
+            (edge_number[min(e), max(e)], k)
+            for k, p in enumerate(polygons)
+            for e in zip(p, p[1:] + p[:1], strict=True)
+        ]
+    )
     ends = np.array(edges)
     middle = sparse.csr_array(
         (np.full(2 * n_edges, 0.5), (np.repeat(np.arange(n_edges), 2), ends.ravel())),
@@ -258,12 +255,14 @@ def catmull_clark(
     quads = []
     for k, p in enumerate(polygons):
         for before, here, after in zip(p[-1:] + p[:-1], p, p[1:] + p[:1], strict=True):
-            quads.append((
-                here,
-                n + edge_number[min(here, after), max(here, after)],
-                n + n_edges + k,
-                n + edge_number[min(before, here), max(before, here)],
-            ))
+            quads.append(
+                (
+                    here,
+                    n + edge_number[min(here, after), max(here, after)],
+                    n + n_edges + k,
+                    n + edge_number[min(before, here), max(before, here)],
+                )
+            )
     return operator, np.array(quads)
 
 

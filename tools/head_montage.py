@@ -8,9 +8,10 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from head_pictures import Picture, draw, montage, save
 from numpy.typing import NDArray
 from scipy import sparse
+
+from head_pictures import Picture, draw, montage, save
 
 Array = NDArray[np.float64]
 
@@ -66,17 +67,18 @@ def people(asset: Asset, size: int) -> Picture:
     ]  # fmt: skip
     rows = [[asset.picture(asset.mean, asset.colours, size=wide, **view) for view in views]]
     pairs = list(zip(asset.subjects, asset.subject_colours, strict=True))
-    for yaw in (0.0, 55.0):
-        rows.append([asset.picture(s, c, size=size, yaw=yaw, half_height=0.15) for s, c in pairs])
     draws = np.random.default_rng(RANDOM_SEED).standard_normal((N_RANDOM, len(asset.modes)))
-    shapes = [
-        asset.mean + np.tensordot(alpha, asset.modes, axes=1) for alpha in np.clip(draws, -BOX, BOX)
+    random = [
+        (asset.mean + np.tensordot(alpha, asset.modes, axes=1), asset.colours)
+        for alpha in np.clip(draws, -BOX, BOX)
     ]
-    for yaw in (0.0, 70.0):
-        for half in (shapes[:10], shapes[10:]):
-            rows.append([
-                asset.picture(s, asset.colours, size=size, yaw=yaw, half_height=0.15) for s in half
-            ])
+    rows += [
+        [asset.picture(s, c, size=size, yaw=yaw, half_height=0.15) for s, c in ten]
+        for yaw, ten in (
+            (0.0, pairs), (55.0, pairs), (0.0, random[:10]), (0.0, random[10:]),
+            (70.0, random[:10]), (70.0, random[10:]),
+        )
+    ]  # fmt: skip
     return montage(rows)
 
 
@@ -85,9 +87,7 @@ def with_points(
 ) -> Picture:
     """The mean in grey with the points of some sides and their names."""
     grey = np.full_like(asset.colours, 205)
-    picture, pixels = draw(
-        asset.operator @ asset.mean, asset.faces, grey, asset.occlusion, **view
-    )
+    picture, pixels = draw(asset.operator @ asset.mean, asset.faces, grey, asset.occlusion, **view)
     picture = np.ascontiguousarray(picture)
     for row in rows:
         if row["side"] in sides:

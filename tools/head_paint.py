@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import trimesh
-from head_mesh import BaseMesh
-from head_source import Source
 from numpy.typing import NDArray
 from scipy import sparse
+
+from head_mesh import BaseMesh
+from head_source import Source
 
 Array = NDArray[np.float64]
 Points = dict[tuple[str, str], int]
@@ -113,7 +114,9 @@ class Painter:
             half = 1e-3 * width * np.interp(place, [0, 0.3, 0.65, 1.0], [2.7, 3.1, 2.6, 1.9])
             edge = 1.0 - smooth_step(distance / half, 0.35, 1.65)
             front = self.mean[:, 2] > -0.05
-            weight = np.maximum(weight, edge * front * np.interp(place, [0, 0.15, 0.6, 1], [0.6, 1, 1, 0.5]))
+            weight = np.maximum(
+                weight, edge * front * np.interp(place, [0, 0.15, 0.6, 1], [0.6, 1, 1, 0.5])
+            )
         return weight
 
     def colours(self, tone: Tone) -> NDArray[np.uint8]:
@@ -134,7 +137,7 @@ class Painter:
         mix(0.42 * self.ears * tone.blood, skin * [0.99, 0.76, 0.73])
         mix(0.30 * self.lids, skin * [0.86, 0.78, 0.78])
         mix(0.8 * smooth_step(self.lips, 0.1, 0.85), tone.lips)
-        mix(0.8 * smooth_step(self.slit, 0.3, 1.0), np.array(tone.lips) * [0.62, 0.50, 0.50])
+        mix(0.85 * smooth_step(self.slit, 0.3, 0.85), np.array(tone.lips) * [0.50, 0.40, 0.40])
         for side in ("left", "right"):  # else a pale speck catches the light beside the mouth
             mix(0.45 * blob(self.mean, at["ch", side], 0.0022), np.array(tone.lips) * 0.75)
         mix(0.78 * self.brows(tone.brow_width), tone.brows)
@@ -194,6 +197,10 @@ def regions(painter: Painter) -> NDArray[np.uint8]:
     ear_z = at["t", "left"][2]
     chin_y, mouth_y, nose_y = at["sl", "mid"][1], at["ls", "mid"][1], at["sn", "mid"][1]
     brow_y, hair_y = at["sci", "left"][1], at["tr", "mid"][1]
+    # The forehead comes down to the root of the nose between the brows.
+    brow_y = np.interp(
+        x, [0.006, at["sci", "left"][0]], [0.5 * (at["g", "mid"] + at["n", "mid"])[1], brow_y]
+    )
     jaw_y, lowest = at["go", "left"][1], at["me", "mid"][1]
     number = np.full(len(v), REGIONS.index("skull"))
     front = z > ear_z
@@ -208,7 +215,9 @@ def regions(painter: Painter) -> NDArray[np.uint8]:
     lobe_y = at["obi", "left"][1]
     top = np.interp(z, [ear_z, at["ch", "left"][2]], [lobe_y, at["ch", "left"][1] - 0.012])
     set_region("jaw", front & (y < top) & (y >= floor))
-    set_region("neck", ((y < floor) & (z <= at["pg", "mid"][2] + 0.01)) | (~front & (y < lobe_y - 0.02)))
+    set_region(
+        "neck", ((y < floor) & (z <= at["pg", "mid"][2] + 0.01)) | (~front & (y < lobe_y - 0.02))
+    )
     set_region("chin", front & (y <= chin_y) & (y >= floor) & (x < at["ch", "left"][0]))
     ch = at["ch", "left"]
     set_region(

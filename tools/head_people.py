@@ -13,9 +13,10 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
+
 from head_mesh import BaseMesh, add_eyes
 from head_source import Source, sparse_to_dense
-from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
