@@ -42,6 +42,10 @@ lock:
 	$(COMPILE) --extra app --group build -o requirements.lock
 	$(COMPILE) --extra dev -c requirements.lock -o requirements-dev.lock
 
+head: .venv/.dev
+	$(INSTALL) --no-deps embreex==4.4.0.post1 "pip>=24"
+	.venv/bin/python tools/build_head.py
+
 clean:
 	rm -rf .venv build dist .coverage .hypothesis .pytest_cache .ruff_cache .import_linter_cache
 
