@@ -181,14 +181,13 @@ def _triangles(text: bytes, file: str, part: Part) -> NDArray[np.uint32]:
     triangles: list[tuple[int, int, int]] = []
     for polygon in polygons[: part.polygons]:
         try:
-            first, *rest = (int(corner.partition(b"/")[0]) for corner in polygon)
-        except ValueError as error:
-            raise AssetError(f"{file}: damaged polygon {b' '.join(polygon)!r:.60}") from error
-        triangles += ((first, second, third) for second, third in pairwise(rest))
-    faces = np.array(triangles, dtype=np.int64) - 1
-    if faces.min() < 0 or faces.max() >= part.vertices:
-        wrong = faces.max() if faces.min() >= 0 else faces.min()
-        raise AssetError(
-            f"{file}: vertex {wrong + 1} of a polygon is not within 1 to {part.vertices}"
-        )
-    return faces.astype(np.uint32)
+            corners = [int(corner.partition(b"/")[0]) for corner in polygon]
+        except ValueError:
+            corners = []
+        if len(corners) < 3 or min(corners) < 1 or max(corners) > part.vertices:
+            raise AssetError(
+                f"{file}: polygon {b' '.join(polygon).decode(errors='replace')!r:.60} is not three or more "
+                f"vertices within 1 to {part.vertices}"
+            )
+        triangles += ((corners[0], b, c) for b, c in pairwise(corners[1:]))
+    return np.array(triangles, dtype=np.uint32) - np.uint32(1)
