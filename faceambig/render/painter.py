@@ -43,8 +43,18 @@ def paint_photo(photo: Photo, width: int) -> NDArray[np.uint8]:
     return paint(photo.vertices, photo, photo.focal, (width, height))
 
 
-def paint(vertices: Array, photo: Photo, focal: float, size: tuple[int, int]) -> NDArray[np.uint8]:
-    """(H, W, 3) sRGB picture of `vertices` (V, 3) with the triangles, colours and frame of `photo`; size (W, H)."""
+def paint(
+    vertices: Array,
+    photo: Photo,
+    focal: float,
+    size: tuple[int, int],
+    *,
+    colours: NDArray[np.uint8] | None = None,
+) -> NDArray[np.uint8]:
+    """(H, W, 3) sRGB picture, size (W, H), of `vertices` (V, 3) in camera axes, framed as `photo` is.
+
+    The triangles are the photo's; `colours` (V, 3) too where none are given.
+    """
     width, height = SAMPLES * size[0], SAMPLES * size[1]
     depth = np.maximum(vertices[:, 2], NEAREST)
     x = (focal * vertices[:, 0] / depth + photo.principal[0]) * (width / photo.width)
@@ -52,11 +62,11 @@ def paint(vertices: Array, photo: Photo, focal: float, size: tuple[int, int]) ->
     faces = photo.faces[(vertices[:, 2] > NEAREST)[photo.faces].all(axis=1)]
     # Camera axes are turned by half about x: y up and z to the camera, as the lights are given.
     turned = vertices * (1.0, -1.0, -1.0)
-    colours = shade(turned, faces, photo.colours, photo.occlusion)
+    lit = shade(turned, faces, photo.colours if colours is None else colours, photo.occlusion)
     ramp = np.linspace(0.0, 1.0, height)[:, None]
     rows = (1.0 - ramp) * BACKGROUND[0] + ramp * BACKGROUND[1]
     picture = np.repeat((255.0 * rows[:, None]).astype(np.float32), width, axis=1)
-    fill(picture, np.stack([x, y, 1.0 / depth], axis=1), faces, colours)
+    fill(picture, np.stack([x, y, 1.0 / depth], axis=1), faces, lit)
     return cv2.resize(picture, size, interpolation=cv2.INTER_AREA).round().astype(np.uint8)
 
 
