@@ -110,6 +110,8 @@ def _check_size(model: FaceModel) -> None:
 
 def _centre(model: FaceModel, names: tuple[str, ...]) -> Array:
     scheme = model.schemes["ibug68"]
+    if missing := set(names) - set(scheme.points):
+        raise AssetError(f"{model.name}: scheme ibug68 has no point {min(missing)}")
     rows = [scheme.points.index(name) for name in names]
     return model.mean[scheme.vertices[rows]].mean(axis=0)
 
