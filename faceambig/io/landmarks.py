@@ -87,7 +87,7 @@ def load_scheme(path: Path, name: str) -> Scheme:
         for number, line in enumerate(text_of(path).splitlines(), start=1)
         if line.strip() and not line.startswith("#")
     ]
-    header = next(csv.reader([rows[0][1]])) if rows else []
+    header = _cells(rows[0][1]) if rows else []
     if not {"name", "side", "vertex"} <= set(header):
         raise AssetError(
             f"{path.name}: expected the columns name, side, vertex, found {','.join(header):.60}"
@@ -95,7 +95,7 @@ def load_scheme(path: Path, name: str) -> Scheme:
     columns = [header.index(column) for column in ("name", "side", "vertex")]
     points, sides, vertices = [], [], []
     for number, line in rows[1:]:
-        cells = next(csv.reader([line]))
+        cells = _cells(line)
         if len(cells) != len(header):
             raise AssetError(
                 f"line {number} of {path.name}: {len(cells)} cells, the header has {len(header)}"
@@ -110,6 +110,13 @@ def load_scheme(path: Path, name: str) -> Scheme:
         sides.append(side)
         vertices.append(int(vertex))
     return make_scheme(name, points, sides, vertices, path.name)
+
+
+def _cells(line: str) -> list[str]:
+    try:
+        return next(csv.reader([line]))
+    except csv.Error:  # a cell of more than 131,072 characters
+        return []
 
 
 def make_scheme(
