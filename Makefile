@@ -45,7 +45,7 @@ lock:
 # embreex exactly: another ray tracer may move the last digit of the head's paint. pip: the tool fetches its source
 # by it, and uv leaves it out.
 head: .venv/.dev
-	$(INSTALL) --no-deps embreex==4.4.0.post1 "pip>=24"
+	$(INSTALL) --no-deps embreex==4.4.0.post1 pip
 	.venv/bin/python tools/build_head.py
 
 clean:
