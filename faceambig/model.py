@@ -1,17 +1,17 @@
 """FaceModel: a mean face and its modes of variation, with named landmarks.
 
-A face is v = mean + Q alpha, metres (paper, section 3.1). Q is already multiplied by one standard deviation per mode, so
-alpha ~ N(0, I) and |alpha_j| <= k reads "k standard deviations". Axes: +x the subject's left, +y up, +z out of the face;
-origin between the eyes of the mean head.
+A face is v = mean + Q alpha, metres (paper, section 3.1). Q is already multiplied by one standard deviation per mode,
+so alpha ~ N(0, I) and |alpha_j| <= k reads "k standard deviations". Axes: +x the subject's left, +y up, +z out of the
+face; origin between the eyes of the mean head.
 
-A model may be stored at a coarser *control* resolution (B vertices) with a linear subdivision operator to the N vertices
-of the surface: rows of the operator sum to 1, so rigid motions and statistics commute with it. Everything below is exact
-for both kinds; without an operator the control vertices are the surface.
+A model may be stored at a coarser *control* resolution (B vertices) with a linear subdivision operator to the N
+vertices of the surface: rows of the operator sum to 1, so rigid motions and statistics commute with it. Everything
+below is exact for both kinds; without an operator the control vertices are the surface.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -31,8 +31,12 @@ class Scheme:
     points: tuple[str, ...]  # L names, in the order of the picture's points
     vertices: IntArray  # (L,) vertex numbers of the surface
     sides: tuple[str, ...]  # L of "right", "left", "mid": the subject's
-    eyes: tuple[tuple[int, ...], tuple[int, ...]]  # rows whose mean is the centre of the right and of the left eye
-    eyes_meaning: str  # the definition of the interocular distance, in words, printed with every d_L
+    eyes: tuple[
+        tuple[int, ...], tuple[int, ...]
+    ]  # rows whose mean is the centre of the right and of the left eye
+    eyes_meaning: (
+        str  # the definition of the interocular distance, in words, printed with every d_L
+    )
 
     def __post_init__(self) -> None:
         vertices = np.asarray(self.vertices, dtype=np.intp)
@@ -65,7 +69,9 @@ class FaceModel:
     control_modes: Array  # (B, 3, S) metres per standard deviation
     faces: NDArray[np.uint32]  # (F, 3) triangles of the surface, wound outward
     schemes: Mapping[str, Scheme]
-    subdivision: sparse.csr_array | None = None  # (N, B); None: the control vertices are the surface
+    subdivision: sparse.csr_array | None = (
+        None  # (N, B); None: the control vertices are the surface
+    )
     coarse_faces: NDArray[np.uint32] | None = None  # (Fc, 3) over the first B surface vertices
     colours: NDArray[np.uint8] | None = None  # (N, 3) sRGB
     occlusion: NDArray[np.uint8] | None = None  # (N,) ambient occlusion, 255 is fully open
@@ -74,7 +80,9 @@ class FaceModel:
     subjects: tuple[Subject, ...] = ()
     licence: str = ""
     source: str = ""
-    file_origin: Array = field(default_factory=lambda: np.zeros(3))  # (3,) where the file's own origin lies, metres
+    file_origin: Array = field(
+        default_factory=lambda: np.zeros(3)
+    )  # (3,) where the file's own origin lies, metres
     mean: Array = field(init=False)  # (N, 3) metres
 
     def __post_init__(self) -> None:
@@ -108,7 +116,9 @@ class FaceModel:
         a = checked("alpha", alpha, (None,))
         if len(a) > self.n_modes:
             raise ValueError(f"alpha: {len(a)} values for a model of {self.n_modes} modes")
-        flat = self.control_modes.reshape(-1, self.n_modes)  # one matrix-vector product, six times faster than B of them
+        flat = self.control_modes.reshape(
+            -1, self.n_modes
+        )  # one matrix-vector product, six times faster than B of them
         return self.control_mean + (flat[:, : len(a)] @ a).reshape(-1, 3)
 
     def rows(self, vertices: IntArray) -> tuple[Array, Array]:
@@ -122,7 +132,9 @@ class FaceModel:
     def scheme(self, name: str) -> Scheme:
         """The named landmark scheme; ValueError lists those the model has."""
         if name not in self.schemes:
-            raise ValueError(f"unknown scheme {name!r}: this model has {listed(self.schemes) or 'none'}")
+            raise ValueError(
+                f"unknown scheme {name!r}: this model has {listed(self.schemes) if self.schemes else 'none'}"
+            )
         return self.schemes[name]
 
     def subject(self, number: int) -> Subject:
@@ -143,9 +155,3 @@ class FaceModel:
 def replace_model(model: FaceModel, **changes: Any) -> FaceModel:
     """`model` with some fields changed; `mean` follows by itself."""
     return replace(model, **changes)
-
-
-def eye_corners(scheme_points: Sequence[str], right: Sequence[str], left: Sequence[str]) -> tuple:
-    """Rows of the named corners of the right and left eye, for Scheme.eyes."""
-    index = {name: row for row, name in enumerate(scheme_points)}
-    return tuple(index[name] for name in right), tuple(index[name] for name in left)
