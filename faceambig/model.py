@@ -31,12 +31,9 @@ class Scheme:
     points: tuple[str, ...]  # L names, in the order of the picture's points
     vertices: IntArray  # (L,) vertex numbers of the surface
     sides: tuple[str, ...]  # L of "right", "left", "mid": the subject's
-    eyes: tuple[
-        tuple[int, ...], tuple[int, ...]
-    ]  # rows whose mean is the centre of the right and of the left eye
-    eyes_meaning: (
-        str  # the definition of the interocular distance, in words, printed with every d_L
-    )
+    # Rows whose mean is the centre of the right and of the left eye
+    eyes: tuple[tuple[int, ...], tuple[int, ...]]
+    eyes_meaning: str  # the definition of the interocular distance, printed with every d_L
 
     def __post_init__(self) -> None:
         vertices = np.asarray(self.vertices, dtype=np.intp)
@@ -69,9 +66,7 @@ class FaceModel:
     control_modes: Array  # (B, 3, S) metres per standard deviation
     faces: NDArray[np.uint32]  # (F, 3) triangles of the surface, wound outward
     schemes: Mapping[str, Scheme]
-    subdivision: sparse.csr_array | None = (
-        None  # (N, B); None: the control vertices are the surface
-    )
+    subdivision: sparse.csr_array | None = None  # (N, B); None: control vertices are the surface
     coarse_faces: NDArray[np.uint32] | None = None  # (Fc, 3) over the first B surface vertices
     colours: NDArray[np.uint8] | None = None  # (N, 3) sRGB
     occlusion: NDArray[np.uint8] | None = None  # (N,) ambient occlusion, 255 is fully open
@@ -80,9 +75,8 @@ class FaceModel:
     subjects: tuple[Subject, ...] = ()
     licence: str = ""
     source: str = ""
-    file_origin: Array = field(
-        default_factory=lambda: np.zeros(3)
-    )  # (3,) where the file's own origin lies, metres
+    # (3,) metres, where the file's own origin lies in these coordinates
+    file_origin: Array = field(default_factory=lambda: np.zeros(3))
     mean: Array = field(init=False)  # (N, 3) metres
 
     def __post_init__(self) -> None:
@@ -116,9 +110,8 @@ class FaceModel:
         a = checked("alpha", alpha, (None,))
         if len(a) > self.n_modes:
             raise ValueError(f"alpha: {len(a)} values for a model of {self.n_modes} modes")
-        flat = self.control_modes.reshape(
-            -1, self.n_modes
-        )  # one matrix-vector product, six times faster than B of them
+        # One matrix-vector product: six times faster than B of them
+        flat = self.control_modes.reshape(-1, self.n_modes)
         return self.control_mean + (flat[:, : len(a)] @ a).reshape(-1, 3)
 
     def rows(self, vertices: IntArray) -> tuple[Array, Array]:
@@ -132,9 +125,8 @@ class FaceModel:
     def scheme(self, name: str) -> Scheme:
         """The named landmark scheme; ValueError lists those the model has."""
         if name not in self.schemes:
-            raise ValueError(
-                f"unknown scheme {name!r}: this model has {listed(self.schemes) if self.schemes else 'none'}"
-            )
+            known = listed(self.schemes) if self.schemes else "none"
+            raise ValueError(f"unknown scheme {name!r}: this model has {known}")
         return self.schemes[name]
 
     def subject(self, number: int) -> Subject:
