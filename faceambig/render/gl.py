@@ -1,8 +1,8 @@
 """One head as a picture, drawn off-screen by pyrender on OSMesa or EGL: the same pixels on both.
 
-Everything that has to be mended in pyrender 0.1.45 and in the PyOpenGL it pins is here and nowhere else. One thread owns
-the one renderer: an EGL context works only in the thread that made it, and deleting one EGL renderer ends all others.
-pyrender is imported by the first picture, in that thread; importing this module costs nothing and needs no OpenGL.
+Everything that has to be mended in pyrender 0.1.45 and in the PyOpenGL it pins is here and nowhere else. One thread
+owns the one renderer: an EGL context works only in the thread that made it, and deleting one EGL renderer ends all
+others. pyrender is imported by the first picture, in that thread; importing this module needs no OpenGL.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Array
+from ..arrays import Array, IntArray
 from ..scene import Head, View
 from .painter import vertex_normals
 
@@ -49,6 +49,8 @@ LIGHTS = (
 AMBIENT = (0.13, 0.125, 0.12)
 ROUGHNESS = 0.62
 INSIDE = 0.42  # sRGB grey of back faces: a cut surface, never a look into the empty head
+
+BEAD, BEAD_COLOUR = 0.0013, (0x1B, 0x5F, 0xC1)  # metres, sRGB: a landmark on a head
 
 _count = itertools.count()
 
@@ -95,17 +97,23 @@ def render_head(
     pixels_per_metre: float,
     *,
     middle: tuple[float, float] = (0.0, 0.0),
+    marked: IntArray | None = None,
 ) -> NDArray[np.uint8]:
     """(height, width, 4) RGBA picture of one head, alpha not premultiplied, nothing behind it.
 
     middle: the point of the picture's middle, metres along the viewer's right and up from the head's origin. Parallel
-    rays: one scale in the whole picture. Raises NoRendererError where nothing can draw.
+    rays: one scale in the whole picture. marked: vertices that get a bead. NoRendererError where nothing can draw.
     """
     R = viewer_rotation(view)
     points = head.vertices @ R.T
     points[:, :2] -= middle
     normals = vertex_normals(head.vertices, head.faces) @ R.T
     colours = _lit_colours(head) if head.lit else _shown_colours(head, normals)
+    faces = head.faces
+    if marked is not None and len(marked):
+        points, normals, faces, colours = _with_beads(
+            points, normals, faces, colours, points[marked], head.lit
+        )
     factor = 2 if 4 * width * height <= LARGEST else 1
     half = (width / (2 * pixels_per_metre), height / (2 * pixels_per_metre))
     large = _studio().call(
@@ -143,7 +151,29 @@ def _shown_colours(head: Head, normals: Array) -> Array:
     return head.colours / 255.0 * shade[:, None]
 
 
-def srgb_to_linear(colours: Array) -> Array:
+def _with_beads(
+    points: Array, normals: Array, faces: NDArray[np.uint32], colours: Array, at: Array, lit: bool
+) -> tuple[Array, Array, NDArray[np.uint32], Array]:
+    """The mesh with a small ball at each of `at` (M, 3): hidden where the face hides it."""
+    import trimesh
+
+    ball = trimesh.creation.icosphere(subdivisions=1, radius=1.0)
+    shape, triangles = np.asarray(ball.vertices), np.asarray(ball.faces)
+    starts = len(points) + len(shape) * np.arange(len(at))
+    colour = np.array(BEAD_COLOUR) / 255.0
+    shown = srgb_to_linear(colour) if lit else colour
+    n = len(at)
+    return (
+        np.concatenate([points, (at[:, None] + BEAD * shape).reshape(-1, 3)]),
+        np.concatenate([normals, np.tile(shape, (n, 1))]),
+        np.concatenate(
+            [faces, (starts[:, None, None] + triangles).reshape(-1, 3).astype(np.uint32)]
+        ),
+        np.concatenate([colours, np.tile(shown, (n * len(shape), 1))]),
+    )
+
+
+def srgb_to_linear(colours: ArrayLike) -> Array:
     """Linear light of sRGB 0 to 1 by the power 2.2 that pyrender's shader undoes."""
     return np.asarray(colours, dtype=np.float64) ** 2.2
 
@@ -181,7 +211,7 @@ def _frame(
     # Back faces are the same triangles wound the other way, of one grey: their normals point where no lamp is and
     # the light comes from the material itself.
     down = np.tile([0.0, -1.0, 0.0], (len(points), 1))
-    grey = np.full((len(points), 3), srgb_to_linear(np.float64(INSIDE)) if lit else INSIDE)
+    grey = np.full((len(points), 3), srgb_to_linear(INSIDE) if lit else INSIDE)
     glowing = pyrender.MetallicRoughnessMaterial(
         baseColorFactor=[0.0, 0.0, 0.0, 1.0] if lit else [1.0, 1.0, 1.0, 1.0],
         emissiveFactor=[1.0, 1.0, 1.0], metallicFactor=0.0, roughnessFactor=1.0,
@@ -294,8 +324,12 @@ def _import_pyrender(name: str) -> Any:
     import pyrender
     from pyrender.platforms.osmesa import OSMesaPlatform
 
-    OSMesaPlatform.supports_framebuffers = lambda self: True  # noqa: ARG005 - else no antialiasing and no alpha
-    pyrender.Mesh.bounds = property(_bounds)  # numpy 2 has no np.infty
+    mends: tuple[tuple[Any, str, Any], ...] = (
+        (OSMesaPlatform, "supports_framebuffers", lambda _: True),  # else no antialiasing, no alpha
+        (pyrender.Mesh, "bounds", property(_bounds)),  # NumPy 2 has no np.infty
+    )
+    for where, attribute, value in mends:
+        setattr(where, attribute, value)
     return pyrender
 
 
@@ -317,13 +351,13 @@ def _mend_format_handler() -> None:
 def _mend_osmesa() -> None:
     """PyOpenGL 3.1.0 lacks OSMesaCreateContextAttribs, and its contexts cannot be keys of a dictionary."""
     import OpenGL.osmesa as osmesa
-    from OpenGL.platform import PLATFORM
+    from OpenGL import platform
     from OpenGL.raw.osmesa._types import OSMesaContext
 
     if hasattr(osmesa, "OSMesaCreateContextAttribs"):
         return
     OSMesaContext.__hash__ = lambda self: ctypes.cast(self, ctypes.c_void_p).value or 0
-    create = PLATFORM.GL.OSMesaCreateContextAttribs
+    create = platform.PLATFORM.GL.OSMesaCreateContextAttribs
     create.restype = OSMesaContext
     create.argtypes = [ctypes.POINTER(ctypes.c_int), ctypes.c_void_p]
     osmesa.OSMesaCreateContextAttribs = create

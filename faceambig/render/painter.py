@@ -1,8 +1,8 @@
 """The synthetic photograph, painted without OpenGL, so that the page needs no graphics library.
 
-A z-buffer in NumPy. Every triangle is cut into spans, one for each row of samples it covers; the ends of a span follow
-from the three edges at once. Spans are laid out behind each other as samples, the nearest sample of each pixel wins, and
-only the winners get a colour. No step loops over triangles, and nothing depends on their order or size.
+A z-buffer in NumPy. Every triangle is cut into spans, one for each row of samples it covers; the ends of a span
+follow from the three edges at once. Spans are laid out behind each other as samples, the nearest sample of each pixel
+wins, and only the winners get a colour. No step loops over triangles, and nothing depends on their order or size.
 """
 
 from __future__ import annotations
@@ -117,7 +117,7 @@ class Spans(NamedTuple):
     triangle: NDArray[np.intp]  # (P,)
     row: NDArray[np.intp]  # (P,)
     first: NDArray[np.intp]  # (P,) column of the first sample
-    count: NDArray[np.intp]  # (P,) samples, at least 1
+    samples: NDArray[np.intp]  # (P,) how many, at least 1
 
 
 def fill(
@@ -125,8 +125,8 @@ def fill(
 ) -> None:
     """Paint triangles into `picture` (H, W, 3), the nearest one on each pixel.
 
-    points (V, 3): x, y in pixels (pixel i spans i to i + 1) and 1 / depth. colours (V, 3). Front faces are wound counter-
-    clockwise on the screen as it is seen; back faces are painted in the grey of the inside.
+    points (V, 3): x, y in pixels (pixel i spans i to i + 1) and 1 / depth. colours (V, 3). Front faces are wound
+    counterclockwise as they are seen; back faces are painted in the grey of the inside.
     """
     height, width = picture.shape[:2]
     corners = points[faces]
@@ -190,8 +190,8 @@ def _samples(
     spans: Spans, width: int
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float32]]:
     """Of every sample: its pixel's number, its span, and how many samples it is behind the span's first."""
-    before = np.cumsum(spans.count) - spans.count
-    span = np.repeat(np.arange(len(before)), spans.count)
+    before = np.cumsum(spans.samples) - spans.samples
+    span = np.repeat(np.arange(len(before)), spans.samples)
     column = np.arange(len(span)) - before[span]
     pixel = (spans.row * width + spans.first)[span] + column
     return pixel, span, column.astype(np.float32)
