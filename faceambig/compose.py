@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ from .scene import Curves, Head, Legend, Numbers, Photo, Scene, View
 from .sweep import Sweep
 
 HALF_HEIGHT = 0.165  # metres: a large head with its neck
-SPACING = 0.27  # metres between two heads of the row: they never touch while turning
+SPACING = 0.26  # metres between two heads of the row: they never touch while turning
 DIFFERENCE_MM = 15.0  # end of the difference scale
 UNMEASURED = (176, 178, 184)  # grey of what is not in d_S
 CLAY = (205, 172, 150)
@@ -36,8 +37,8 @@ INFERNO = np.array(
 )  # fmt: skip
 VIEWS: Mapping[str, tuple[float, float]] = {  # azimuth, elevation in degrees
     "front": (0.0, 0.0),
-    "three_quarter": (32.0, 6.0),
-    "side": (90.0, 0.0),
+    "three_quarter": (-32.0, 6.0),
+    "side": (-90.0, 0.0),
     "top": (0.0, 89.0),
 }
 
@@ -188,6 +189,7 @@ def compose(
         heads=heads,
         views=(named_view("front" if view == "camera" else view),),
         photo=with_fit(picture, face, whole=view == "camera"),
+        pivot=pivot(model),
         numbers=numbers(face),
         curves=curve,
         legend=difference_legend(*legend_words) if difference else None,
@@ -225,10 +227,18 @@ def compose_row(
         heads=tuple(heads),
         views=(named_view("front"), named_view("side")),
         photo=picture,
+        pivot=pivot(model),
         numbers=numbers(faces[-1]),
         legend=difference_legend(*legend_words),
         note=note,
     )
+
+
+@lru_cache(maxsize=8)
+def pivot(model: FaceModel) -> tuple[float, float, float]:
+    """The middle of the mean head's height and depth, metres: heads that turn about it stay in their place."""
+    low, high = model.mean.min(axis=0), model.mean.max(axis=0)
+    return 0.0, float(low[1] + high[1]) / 2, float(low[2] + high[2]) / 2
 
 
 def head(

@@ -1,7 +1,7 @@
 """Scene: everything one picture of the page or a snapshot shows, as plain arrays. No behaviour.
 
 The page (viser) and the snapshot (pyrender) both draw a Scene and can compute nothing themselves, so they cannot
-disagree. Heads stand in a row: each has a `slot`, metres along the viewer's right, and turns in place about its origin.
+disagree. Heads stand in a row: each has a `slot`, metres along the viewer's right, and turns in place about the pivot.
 """
 
 from __future__ import annotations
@@ -109,6 +109,7 @@ class Scene:
     curves: Curves | None = None
     legend: Legend | None = None
     through_camera: bool = False  # the picture is the photo itself, fitted face beside true face
+    pivot: tuple[float, float, float] = (0.0, 0.0, 0.0)  # metres, model axes: where heads are centred and turn about
     scale_bar: float = 0.05  # metres
     note: str = ""  # one line: model, subject, what is grey
     landmarks: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.intp))  # (L,) vertices marked on heads

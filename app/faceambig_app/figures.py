@@ -6,6 +6,7 @@ Colours are CSS variables of STYLE, so one string serves light and dark.
 from __future__ import annotations
 
 import base64
+from collections.abc import Iterable
 from html import escape
 
 import numpy as np
@@ -38,6 +39,13 @@ font-size:12.5px;padding:1px 7px;border-radius:4px}
 .fa-plot{display:block;width:100%;height:auto;font-size:11.5px}.fa-plot text{fill:var(--fa-dim)}
 .fa-plot .t{font-weight:650;font-size:12.5px}
 .fa-hidden{position:absolute;width:1px;height:1px;overflow:hidden;clip-path:inset(50%)}
+.fa-both{display:grid;grid-template-columns:46% 1fr;align-items:start}
+.fa-both .fa{padding-right:0}.fa-both .fa+.fa{padding-right:.75em}.fa-both .fa-cards{grid-template-columns:1fr}
+canvas[data-engine]{background:#F3F6F9}[data-mantine-color-scheme=dark] canvas[data-engine]{background:#181C21}
+.mantine-Slider-root:has(.mantine-Slider-markLabel){padding-bottom:20px!important}
+.mantine-Slider-markLabel{margin-top:7px}
+@media(max-width:576px){.mantine-Paper-root[style*="20em"]{width:100%!important;left:0!important;right:0!important}
+.mantine-ScrollArea-content>div[style*="20em"]{width:100%!important}}
 .fa-warn{border-left:4px solid #C8102E;padding-left:8px}
 </style>"""
 
@@ -45,11 +53,17 @@ WIDTH, LEFT, RIGHT = 340, 34, 330  # of the plots, in SVG units
 TICKS_CM = (20, 30, 60, 120, 240)
 D_L_TOP, D_L_BOTTOM, D_S_TOP, D_S_BOTTOM = 24, 94, 128, 222
 D_L_MAX = 6.0  # percent
-CROSS, CIRCLE = 4.0, 5.0  # half sizes in pixels of a picture of 500
+CROSS, CIRCLE = 3.6, 4.6  # half sizes in pixels of a picture of 500
 RED, BLUE = "#C8102E", "#1B5FC1"  # on the photograph, in both themes, with a white halo
 
 
-def heading(photo_caption: str, assumed: float | None, actual: float, points: int) -> str:
+def hidden_boxes(uuids: Iterable[str]) -> str:
+    """Hide the number boxes of sliders that count steps: the box would show the step, not the distance."""
+    selectors = ",".join(f'[id="{uuid}"]+div' for uuid in uuids)
+    return f"<style>{selectors}{{display:none}}</style>"
+
+
+def heading(assumed: float | None, actual: float, points: int) -> str:
     """The first words of the page."""
     lead = say("app.lead", actual=distance_text(actual), assumed=distance_text(assumed), points=points)
     return f'<div class="fa"><h1>{escape(say("app.heading"))}</h1><p>{escape(lead)}</p><p>{escape(say("app.try"))}</p></div>'
@@ -69,6 +83,11 @@ def cards(numbers: Numbers) -> str:
         + _card("fa-ds", say("number.d_s"), f"{numbers.d_s_mm:.1f}", "mm", say("number.d_s_note"), "")
         + f"</div>{warned}</div>"
     )
+
+
+def flex_words(words: str, low: float, high: float) -> str:
+    """What mode A moves, and how far it stays a face."""
+    return f'<div class="fa"><small>{escape(say("flex.words", words=words, low=f"{low:.1f}", high=f"{high:.1f}"))}</small></div>'
 
 
 def _card(tone: str, title: str, value: str, unit: str, note: str, hint: str) -> str:
@@ -99,7 +118,7 @@ def photo_marks(photo: Photo) -> str:
     unit = photo.width / 500
     crosses = "".join(_cross(x, y, CROSS * unit) for x, y in photo.observed if np.isfinite(x + y))
     circles = "".join(_circle(x, y, CIRCLE * unit) for x, y in photo.projected)
-    thin, halo = 1.9 * unit, 3.9 * unit
+    thin, halo = 1.7 * unit, 3.4 * unit
     return (
         '<div class="fa"><div class="fa-photo">'
         f'<svg viewBox="0 0 {photo.width} {photo.height}" role="img" aria-label="{escape(photo.caption)}" fill="none">'
@@ -110,6 +129,11 @@ def photo_marks(photo: Photo) -> str:
         f'<div class="fa-key"><span>{_key(_cross(6, 6, 4), RED)}{escape(say("app.cross"))}</span>'
         f"<span>{_key(_circle(6, 6, 4.5), BLUE)}{escape(say('app.circle'))}</span></div></div>"
     )
+
+
+def side_by_side(marks: str, numbers: str) -> str:
+    """The photograph beside the two numbers, for a narrow browser."""
+    return f'<div class="fa-both">{marks}{numbers}</div>'
 
 
 def _cross(x: float, y: float, r: float) -> str:

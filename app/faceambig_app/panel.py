@@ -12,36 +12,33 @@ from typing import Any
 
 import viser
 
-from .state import FIELDS, Field, ViewState, clamp
-from .text import say
+from .guard import data_html
+from .state import FIELDS, Field, ViewState
+from .text import distance_text, say
 
 Say = Callable[[dict[str, Any]], None]
-Refuse = Callable[[str], None]
 Listener = Callable[[viser.GuiEvent[Any]], Awaitable[None]]
 
 STEPS_PER_OCTAVE = 24.0  # of a distance slider: 2.9 % a step
 MARKS_CM = (20, 30, 60, 120, 240)
 VIEWS = FIELDS["view"].choices
-PATIENCE = 1.0  # seconds a number out of range may stand: "6" of "60" is on its way, not wrong
 
 
 class Panel:
     """The widgets of one room."""
 
-    def __init__(
-        self, gui: viser.GuiApi, state: ViewState, people: tuple[str, ...], say_change: Say, doubt: Callable[[str, Any], None]
-    ) -> None:
-        self._gui, self._say, self._doubt = gui, say_change, doubt
+    def __init__(self, gui: viser.GuiApi, state: ViewState, people: tuple[str, ...], say_change: Say) -> None:
+        self._gui, self._say = gui, say_change
         self._people = people
-        self._shown = state
         self._build_distance(state)
 
     def _build_distance(self, state: ViewState) -> None:
         self._distance = self._distance_slider("distance", state.distance)
         self._distance_cm = self._gui.add_number(
-            say("field.distance_cm"), round(100 * state.distance, 1), step=0.1, hint=say("field.distance_cm_hint")
-        )
-        self._distance_cm.on_update(self._number_heard("distance", scale=0.01))
+            say("field.distance_cm"), centimetres(state.distance), min=centimetres(FIELDS["distance"].low),
+            max=centimetres(FIELDS["distance"].high), step=0.1, hint=say("field.distance_cm_hint"),
+        )  # fmt: skip
+        self._distance_cm.on_update(self._heard("distance", lambda cm: round(0.01 * cm, 5)))
 
     def build_rest(self, state: ViewState) -> None:
         """The controls below the numbers and plots."""
@@ -70,15 +67,18 @@ class Panel:
 
     def show(self, state: ViewState) -> None:
         """Write a state into the widgets. On the event loop only, so a newer value is never overwritten by an older one."""
-        self._shown = state
         self._distance.value = to_step(FIELDS["distance"], state.distance)
-        if abs(self._distance_cm.value - 100 * state.distance) > 0.05:
-            self._distance_cm.value = round(100 * state.distance, 1)
+        self._distance_cm.value = centimetres(state.distance)
         self._actual.value = to_step(FIELDS["actual"], state.actual)
         self._subject.value = self._people[state.subject - 1]
         for name, handle in self._pose.items():
             handle.value = getattr(state, name)
         self._flex.value = state.flex
+
+    def spoken(self, state: ViewState) -> str:
+        """Data for the page's script: the button that is on, and what a screen reader says for a distance slider."""
+        texts = {say(f"field.{name}"): distance_text(getattr(state, name)) for name in ("distance", "actual")}
+        return data_html("pressed", {say("field.view"): say(f"view.{state.view}")}) + data_html("valuetext", texts)
 
     def _distance_slider(self, name: str, value: float) -> viser.GuiSliderHandle[int]:
         field = FIELDS[name]
@@ -105,18 +105,10 @@ class Panel:
 
         return heard
 
-    def _number_heard(self, name: str, scale: float) -> Listener:
-        async def heard(event: viser.GuiEvent[Any]) -> None:
-            if event.client_id is None:
-                return
-            value = event.target.value
-            near, differs = clamp(FIELDS[name], scale * value)
-            if differs:
-                self._doubt(name, value)
-            else:
-                self._say({name: near})
 
-        return heard
+def centimetres(metres: float) -> float:
+    """As a number field shows it: to a tenth."""
+    return round(100.0 * metres, 1)
 
 
 def to_step(field: Field, metres: float) -> int:

@@ -7,7 +7,7 @@ does not depend on the way the slider took.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -25,7 +25,7 @@ from .state import Bend, Fitting, Look, Target, ViewState
 from .text import centimetres, distance_text, percent_number, say
 
 ROW_DISTANCES = (0.3, 0.6, 1.2, 2.4)  # metres, of the strip of faces
-MODEL_DEFAULT = "embedded"
+PHOTO_FULL, PHOTO_DRAFT = 560, 200  # pixels wide, of the page's photograph
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,6 +43,7 @@ class Frame:
 
     state: ViewState
     scene: Scene
+    flex_words: str  # what mode A moves; empty in a draft
     flex_reach: tuple[float, float]  # mm along mode A that give plausible faces
 
 
@@ -121,18 +122,40 @@ def curve(target: Target, fitting: Fitting) -> Curves:
 def frame(state: ViewState, *, with_curves: bool = True) -> Frame:
     """Everything a browser shows of a state. with_curves=False leaves the plots out: they cost a sweep a target."""
     if state.show == "row":
-        return Frame(state, row(state), (0.0, 0.0))
+        return Frame(state, row(state), "", (0.0, 0.0))
     target, fitting = state.target, state.fitting
     taken = photograph(target)
     shown = face(target, fitting, state.bend)
     scene = _scene(target, shown, state.look, curve_of(state) if with_curves else None, _note(taken, target))
-    reach = bending(target, fitting).reach(0) if with_curves or state.flex else (0.0, 0.0)
-    return Frame(state, scene, reach)
+    if not with_curves:
+        return Frame(state, scene, "", (0.0, 0.0))
+    modes = bending(target, fitting)
+    return Frame(state, scene, modes.words[0], modes.reach(0))
+
+
+def curve_key(state: ViewState) -> tuple[Target, Fitting]:
+    """What a state's curves depend on: not its assumed distance."""
+    return state.target, state.fitting._replace(distance=None)
 
 
 def curve_of(state: ViewState) -> Curves:
-    """The curves of a state's target: the same for every assumed distance, so cached under none."""
-    return curve(state.target, state.fitting._replace(distance=None))
+    """The curves of a state's target."""
+    return curve(*curve_key(state))
+
+
+@lru_cache(maxsize=64)
+def photo_jpeg(target: Target, draft: bool) -> bytes:
+    """The photograph as a JPEG for the page; a draft is small and from the coarse mesh, for while a hand turns the head."""
+    import cv2  # 75 ms to import: only where a picture is made
+
+    from faceambig.render.painter import paint_photo
+
+    taken, width = picture(target), PHOTO_FULL
+    coarse = photograph(target).subject.model.coarse_faces
+    if draft and coarse is not None:
+        taken, width = replace(taken, faces=coarse), PHOTO_DRAFT
+    rgb = paint_photo(taken, width)
+    return cv2.imencode(".jpg", rgb[:, :, ::-1], (cv2.IMWRITE_JPEG_QUALITY, 88))[1].tobytes()
 
 
 def row(state: ViewState) -> Scene:

@@ -28,7 +28,7 @@ class Painter(Protocol):
     def draw(self, state: ViewState, draft: bool) -> None:
         """Compute and draw a state; called by one worker at a time."""
 
-    def refuse(self, error: Exception) -> None:
+    def refuse(self, error: BaseException) -> None:
         """Say why a state could not be drawn; the last good frame stays."""
 
 
