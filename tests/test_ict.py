@@ -27,11 +27,8 @@ def made_up() -> tuple[bytes, list[bytes]]:
     # points 37 to 48: right eye from the outer corner over the lid, left eye from the inner
     x = np.array([-4.5, -3.7, -2.6, -1.8, -2.6, -3.7, 1.8, 2.6, 3.7, 4.5, 3.7, 2.6])
     mean[scheme.vertices[36:48]] = np.column_stack([x, np.full(12, 3.0), np.full(12, 9.0)])
-    groups = (
-        (0, 9_409, 9_230),
-        (9_409, 11_248, 11_144),
-        (11_248, N, POLYGONS),
-    )  # vertices, polygons
+    # first vertex, end of the vertices, end of the polygons
+    groups = ((0, 9_409, 9_230), (9_409, 11_248, 11_144), (11_248, N, POLYGONS))
     lines, done = [], 0
     for low, high, polygons in groups:
         for k in range(polygons - done):

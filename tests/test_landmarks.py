@@ -54,9 +54,7 @@ def path(tmp_path) -> Path:
 def test_the_numbers_of_the_file_are_kept(path, text):
     path.write_bytes(text.encode())
     file = fio.load_landmarks(path)
-    assert np.array_equal(
-        file.points, POINTS
-    )  # 300-W counts pixels from 1; that is left to the reader of the result
+    assert np.array_equal(file.points, POINTS)  # 300-W counts from 1, and so does the answer
     assert file.scheme == "ibug68"
 
 
@@ -204,9 +202,9 @@ def written(file: Path, data: bytes) -> Path:
 
 def test_the_size_stands_behind_long_remarks(path):
     jpeg = picture(path.with_suffix(".jpg")).read_bytes()
-    remark = b"\xff\xe1\xff\xff" + bytes(
-        0xFFFF - 2
-    )  # a segment as EXIF writes it, with a size inside that is not it
+    # a segment as EXIF writes it, with a thumbnail whose size is not that of the picture
+    thumbnail = picture(path.with_name("thumbnail.jpg"), 7, 7).read_bytes()
+    remark = b"\xff\xe1\xff\xff" + thumbnail.ljust(0xFFFF - 2, b"\x00")
     long = jpeg[:2] + 5 * remark + b"\xff" + jpeg[2:]
     assert picture_size(written(path.with_suffix(".jpg"), long)) == (40, 30)
 

@@ -391,9 +391,8 @@ def test_any_damage_is_one_line_or_does_no_harm(whole, data):
     except AssetError as error:
         said = str(error)
     assert "\n" not in said
-    assert read is None or np.array_equal(
-        read.mean, model.mean
-    )  # a byte that nobody reads does no harm
+    # a byte that nobody reads does no harm
+    assert read is None or np.array_equal(read.mean, model.mean)
 
 
 @given(data=st.data())

@@ -53,9 +53,8 @@ from ..model import FaceModel, Scheme, Subject
 from .landmarks import check_scheme, load_scheme
 
 FORMAT, VERSION = "faceambig-model", 1
-MAX_BYTES = (
-    1 << 29
-)  # of all arrays as float64; the largest public model, 53,490 vertices and 199 modes, needs 255 MB
+# Of all arrays as float64; the largest public model, 53,490 vertices and 199 modes, needs 255 MB
+MAX_BYTES = 1 << 29
 MAX_SCHEMES = 50
 NO_REGION = 255
 MICROMETRE = 1e-6
