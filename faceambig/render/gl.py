@@ -41,13 +41,14 @@ LARGEST = 12_000_000  # pixels of one frame buffer; 4 samples each with depth ar
 # Direction towards the light in viewer axes (x right, y up, z to the viewer), colour, intensity: the key from above
 # left is two lamps a little apart, which softens its edge as a wide window does.
 LIGHTS = (
-    ((-0.72, 0.62, 0.42), (1.00, 0.94, 0.87), 2.3),
-    ((-0.34, 0.56, 0.76), (1.00, 0.95, 0.89), 2.1),
-    ((0.88, 0.02, 0.50), (0.80, 0.89, 1.00), 1.0),
+    ((-0.72, 0.62, 0.42), (1.00, 0.95, 0.89), 2.05),
+    ((-0.34, 0.56, 0.76), (1.00, 0.96, 0.91), 1.95),
+    ((0.88, 0.02, 0.50), (0.90, 0.94, 1.00), 0.95),
     ((0.72, 0.38, -0.58), (1.00, 1.00, 1.00), 2.2),
 )
-AMBIENT = (0.13, 0.125, 0.12)
+AMBIENT = (0.135, 0.125, 0.12)
 ROUGHNESS = 0.62
+SHEEN, SHEEN_WIDTH = 0.075, 16  # highlight on skin: strength, and the power that narrows it
 INSIDE = 0.42  # sRGB grey of back faces: a cut surface, never a look into the empty head
 
 BEAD, BEAD_COLOUR = 0.0013, (0x1B, 0x5F, 0xC1)  # metres, sRGB: a landmark on a head
@@ -108,7 +109,7 @@ def render_head(
     points = head.vertices @ R.T
     points[:, :2] -= middle
     normals = vertex_normals(head.vertices, head.faces) @ R.T
-    colours = _lit_colours(head) if head.lit else _shown_colours(head, normals)
+    colours = _lit_colours(head, normals) if head.lit else _shown_colours(head, normals)
     faces = head.faces
     if marked is not None and len(marked):
         points, normals, faces, colours = _with_beads(
@@ -132,14 +133,27 @@ def render_head(
     return _reduced(large, factor)
 
 
-def _lit_colours(head: Head) -> Array:
-    """(V, 3) linear: what a lamp's light is multiplied by, occlusion included."""
-    linear = srgb_to_linear(head.colours / 255.0)
-    if head.occlusion is None:
-        return linear
-    open_ = head.occlusion[:, None] / 255.0
-    # Light that reaches a fold has met skin before: it loses blue first, so folds are warm and not grey.
-    return linear * open_ ** np.array([1.0, 1.25, 1.4])
+def _lit_colours(head: Head, normals: Array) -> Array:
+    """(V, 3) linear: what the shader multiplies the lamps' light by. normals (V, 3) in viewer axes."""
+    colours = srgb_to_linear(head.colours / 255.0)
+    open_ = np.ones(len(colours)) if head.occlusion is None else head.occlusion / 255.0
+    bright = np.clip(
+        colours.mean(axis=1) / 0.06, 0.0, 1.0
+    )  # pupils and brows do not shine as skin does
+    # Light that reaches a fold has met skin before: it loses blue and green first, so folds are warm and not grey.
+    colours *= open_[:, None] ** (0.9, 1.2, 1.25)
+    # pyrender tints highlights with the vertex colour; on skin they are white. They are added here, divided by the
+    # light that the shader will multiply with.
+    light = np.full(colours.shape, AMBIENT)
+    sheen = np.zeros(len(colours))
+    for direction, colour, intensity in LIGHTS[:3]:
+        lamp = np.asarray(direction) / np.linalg.norm(direction)
+        facing = np.clip(normals @ lamp, 0.0, None)
+        light += (intensity / np.pi) * facing[:, None] * colour
+        half = lamp + np.array([0.0, 0.0, 1.0])
+        glance = np.clip(normals @ (half / np.linalg.norm(half)), 0.0, None)
+        sheen += intensity * np.sqrt(facing) * glance**SHEEN_WIDTH
+    return colours + (SHEEN / np.pi * bright * open_**2 * sheen)[:, None] / light
 
 
 def _shown_colours(head: Head, normals: Array) -> Array:
@@ -351,13 +365,14 @@ def _mend_format_handler() -> None:
 def _mend_osmesa() -> None:
     """PyOpenGL 3.1.0 lacks OSMesaCreateContextAttribs, and its contexts cannot be keys of a dictionary."""
     import OpenGL.osmesa as osmesa
-    from OpenGL import platform
+    from OpenGL.platform import PLATFORM
     from OpenGL.raw.osmesa._types import OSMesaContext
 
     if hasattr(osmesa, "OSMesaCreateContextAttribs"):
         return
     OSMesaContext.__hash__ = lambda self: ctypes.cast(self, ctypes.c_void_p).value or 0
-    create = platform.PLATFORM.GL.OSMesaCreateContextAttribs
+    library: Any = PLATFORM  # None until a back end is chosen: it is, by now
+    create = library.GL.OSMesaCreateContextAttribs
     create.restype = OSMesaContext
     create.argtypes = [ctypes.POINTER(ctypes.c_int), ctypes.c_void_p]
     osmesa.OSMesaCreateContextAttribs = create

@@ -88,10 +88,13 @@ def shade(
     half /= np.linalg.norm(half, axis=1, keepdims=True)
     sheen = SHEEN * np.clip(np.einsum("vk,vk->v", normals, half), 0.0, None) ** 18
     linear = (colours / 255.0) ** 2.2
+    sheen *= np.clip(
+        linear.mean(axis=1) / 0.06, 0.0, 1.0
+    )  # pupils and brows do not shine as skin does
     if occlusion is not None:
         open_ = occlusion[:, None] / 255.0
-        # Light that reaches a fold has met skin before: it loses blue first, so folds are warm and not grey.
-        light = light * open_ ** (1.0, 1.25, 1.4)
+        # Light that reaches a fold has met skin before: it loses blue and green first: folds are warm, not grey.
+        light = light * open_ ** (0.9, 1.2, 1.25)
         sheen *= open_[:, 0] ** 2
     return 255.0 * np.clip(linear * light + sheen[:, None], 0.0, 1.0) ** (1.0 / 2.2)
 
