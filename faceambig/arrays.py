@@ -23,7 +23,9 @@ def read_only(array: NDArray[T]) -> NDArray[T]:
     return view
 
 
-def checked(name: str, value: ArrayLike, shape: Sequence[int | None], *, nan: bool = False) -> Array:
+def checked(
+    name: str, value: ArrayLike, shape: Sequence[int | None], *, nan: bool = False
+) -> Array:
     """`value` as float64 of `shape` (None: any length); ValueError names the argument and what came."""
     try:
         array = np.asarray(value, dtype=np.float64)

@@ -57,7 +57,9 @@ def camera_points(camera: Camera, points: Array, distance: float | None = None) 
     """Positions (N, 3), metres, in camera axes; `distance` stands in for t_z of an orthographic camera."""
     t_z = camera.distance if camera.distance is not None else distance
     if t_z is None:
-        raise ValueError("distance: an orthographic camera has no position; give a distance to draw from")
+        raise ValueError(
+            "distance: an orthographic camera has no position; give a distance to draw from"
+        )
     return points @ camera.R.T + np.array([*camera.t, t_z])
 
 
@@ -78,7 +80,8 @@ def jacobian(camera: Camera, points: Array, modes: Array) -> Array:
     np.matmul(DR, modes, out=J[:, :, :S])
     qx, qy, qz = q.T
     pose = J[:, :, S:]
-    # -D [q]x: column i is D (e_i x q), with e_x x q = (0, -q_z, q_y), e_y x q = (q_z, 0, -q_x), e_z x q = (-q_y, q_x, 0)
+    # -D [q]x: column i is D (e_i x q), with
+    # e_x x q = (0, -q_z, q_y), e_y x q = (q_z, 0, -q_x), e_z x q = (-q_y, q_x, 0)
     pose[:, :, 0] = tilt * qy[:, None]
     pose[:, 1, 0] -= z * qz
     pose[:, :, 1] = -tilt * qx[:, None]

@@ -106,7 +106,12 @@ def curves(subject: Subject, sweep: Sweep, true_distance: float) -> Curves:
 
 
 def photo(
-    subject: Subject, observation: Observation, camera: Camera, *, caption: str, draw_from: float = 3.0
+    subject: Subject,
+    observation: Observation,
+    camera: Camera,
+    *,
+    caption: str,
+    draw_from: float = 3.0,
 ) -> Photo:
     """The photograph with its points, no fit yet. `draw_from`: metres that stand in for an orthographic distance."""
     size = observation.image_size
@@ -114,7 +119,11 @@ def photo(
         raise ValueError("image_size: the photograph's width and height are needed to draw it")
     cx, cy = observation.centre
     scheme = observation.scheme
-    names = subject.model.scheme(scheme).points if isinstance(scheme, str) else tuple(str(v) for v in scheme)
+    names = (
+        subject.model.scheme(scheme).points
+        if isinstance(scheme, str)
+        else tuple(str(v) for v in scheme)
+    )
     return Photo(
         width=size[0],
         height=size[1],
@@ -183,7 +192,15 @@ def compose(
         fit_colours = greyed(fit_colours)
     heads = (
         head(model, "true", titles[0], subject.vertices, true_colours, slot=-SPACING / 2),
-        head(model, "fit", titles[1], face.vertices, fit_colours, slot=SPACING / 2, lit=not difference),
+        head(
+            model,
+            "fit",
+            titles[1],
+            face.vertices,
+            fit_colours,
+            slot=SPACING / 2,
+            lit=not difference,
+        ),
     )
     return Scene(
         heads=heads,
@@ -214,7 +231,17 @@ def compose_row(
     """
     model = subject.model
     slots = SPACING * (np.arange(len(faces) + 1) - len(faces) / 2)
-    heads = [head(model, "true", titles[0], subject.vertices, skin(subject), slot=slots[0], caption=captions[0])]
+    heads = [
+        head(
+            model,
+            "true",
+            titles[0],
+            subject.vertices,
+            skin(subject),
+            slot=slots[0],
+            caption=captions[0],
+        )
+    ]
     for index, face in enumerate(faces, start=1):
         colours = difference_colours(model, face.gaps_mm)
         heads.append(
@@ -292,14 +319,20 @@ def greyed(colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
 def scale_colours(share: Array) -> NDArray[np.uint8]:
     """sRGB (n, 3) of the magnitude scale at share (n,) of its range, 0 to 1."""
     at = 10.0 * (0.96 - np.clip(share, 0.0, 1.0) * (0.96 - 0.22))
-    return np.stack([np.interp(at, np.arange(11), INFERNO[:, c]) for c in range(3)], axis=1).round().astype(np.uint8)
+    return (
+        np.stack([np.interp(at, np.arange(11), INFERNO[:, c]) for c in range(3)], axis=1)
+        .round()
+        .astype(np.uint8)
+    )
 
 
 def difference_colours(model: FaceModel, gaps_mm: Array) -> NDArray[np.uint8]:
     """(N, 3) sRGB: distance to the true face on the evaluation region (E,), grey elsewhere."""
     colours = np.empty((model.n_vertices, 3), dtype=np.uint8)
     colours[:] = UNMEASURED
-    colours[slice(None) if model.evaluation is None else model.evaluation] = scale_colours(gaps_mm / DIFFERENCE_MM)
+    colours[slice(None) if model.evaluation is None else model.evaluation] = scale_colours(
+        gaps_mm / DIFFERENCE_MM
+    )
     return colours
 
 
@@ -313,5 +346,3 @@ def difference_legend(title: str, note: str) -> Legend:
         ticks=(0.0, 5.0, 10.0, 15.0),
         note=note,
     )
-
-

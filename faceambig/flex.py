@@ -1,7 +1,7 @@
 """Flexibility modes: how far the face may bend while its landmarks hardly move (paper, section 4.4; MATH.md 4).
 
 max |Q f|^2 subject to |Pi f|^2 = c gives Q^T Q f = lambda Pi^T Pi f. Pi^T Pi may be singular (2 L < S), G = Q^T Q never
-is, so the reversed problem Pi^T Pi f = mu G f is solved: mu ascending is flexibility descending, mu = 0 exactly invisible.
+is, so the reversed problem Pi^T Pi f = mu G f is solved: mu ascending is flexibility descending, mu = 0 is invisible.
 Pi is the Jacobian of the reprojection by alpha at the fit, pose fixed: at any distance, in pixels.
 """
 
@@ -49,7 +49,7 @@ class FlexibilityModes:
 
 
 def plausible_limit(n_modes: int) -> float:
-    """Largest |alpha| of a plausible face: mean + 3 sd of the chi distribution with S = n_modes (paper, section 6.4)."""
+    """Largest |alpha| of a plausible face: mean + 3 sd of chi with S = n_modes (paper, section 6.4)."""
     mean = np.sqrt(2.0) * np.exp(gammaln((n_modes + 1) / 2) - gammaln(n_modes / 2))
     return float(mean + 3.0 * np.sqrt(n_modes - mean**2))
 
@@ -82,7 +82,9 @@ def flexibility_modes(model: FaceModel, fit: Fit, count: int = 3) -> Flexibility
         directions.append(f_mm)
         words.append(_words(changes))
     per_mm = np.array([np.linalg.norm(Pi @ f, axis=1).mean() for f in directions])
-    return FlexibilityModes(fit, np.array(directions), 100 * per_mm / fit.interocular_px, tuple(words))
+    return FlexibilityModes(
+        fit, np.array(directions), 100 * per_mm / fit.interocular_px, tuple(words)
+    )
 
 
 @lru_cache(maxsize=8)
@@ -115,9 +117,13 @@ def _regions(model: FaceModel) -> tuple[tuple[str, Array, Array], ...]:
     rows = []
     for name, vertices in parts.items():
         measured = model.evaluation is None or np.isin(vertices, model.evaluation).mean() > 0.5
-        if not measured and name != "ears":  # the back of the head is free to follow and would be the loudest
+        if (
+            not measured and name != "ears"
+        ):  # the back of the head is free to follow and would be the loudest
             continue
-        sample = vertices[:: max(1, len(vertices) // 150)]  # a mean over 150 vertices is a word's worth of precision
+        sample = vertices[
+            :: max(1, len(vertices) // 150)
+        ]  # a mean over 150 vertices is a word's worth of precision
         mean, modes = model.rows(sample)
         rows.append((name, modes, np.sign(mean[:, 0])))
     return tuple(rows)
@@ -128,12 +134,18 @@ def _loudest(changes: dict[str, Array]) -> str:
 
 
 def _words(changes: dict[str, Array]) -> str:
-    """"nose forward, ears back": the two largest movements, of two regions in two ways."""
+    """Such as "nose forward, ears back": the two largest movements, of two regions in two ways."""
     moves = sorted(
-        ((abs(change[axis]), name, axis, change[axis] > 0) for name, change in changes.items() for axis in range(3)),
+        (
+            (abs(change[axis]), name, axis, change[axis] > 0)
+            for name, change in changes.items()
+            for axis in range(3)
+        ),
         reverse=True,
     )
     first = moves[0]
     second = next((m for m in moves[1:] if m[1] != first[1] and m[2:] != first[2:]), None)
     said = [m for m in (first, second) if m is not None and m[0] > 0.3 * first[0]]
-    return ", ".join(f"{name} {DIRECTIONS[axis][0 if positive else 1]}" for _, name, axis, positive in said)
+    return ", ".join(
+        f"{name} {DIRECTIONS[axis][0 if positive else 1]}" for _, name, axis, positive in said
+    )

@@ -5,17 +5,25 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from .arrays import Array, IntArray, checked, read_only
 from .camera import Camera, depths, project
 from .model import FaceModel, Scheme, Subject
 from .rotation import rotation_from_angles
 
-MIN_POINTS = 6  # six pose unknowns at a known distance; fewer leave the pose itself open (MATH.md 8.4)
-FLATTEST = 1e-3  # smallest ratio of the two singular values of the points before they count as one line
-DISTANCES = (0.2, 5.0)  # metres, of the camera that took the photograph; nearer, the nose leaves the lens's view
-EYES_PX = 100.0  # synthetic photographs: frontal distance of the eye centres in a picture of 500 x 500
+MIN_POINTS = (
+    6  # six pose unknowns at a known distance; fewer leave the pose itself open (MATH.md 8.4)
+)
+FLATTEST = (
+    1e-3  # smallest ratio of the two singular values of the points before they count as one line
+)
+DISTANCES = (
+    0.2,
+    5.0,
+)  # metres, of the camera that took the photograph; nearer, the nose leaves the lens's view
+EYES_PX = (
+    100.0  # synthetic photographs: frontal distance of the eye centres in a picture of 500 x 500
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,7 +70,7 @@ class Observation:
     @property
     def visible(self) -> np.ndarray:
         """(L,) True where the point is given and weighs something."""
-        seen = np.isfinite(self.points).all(axis=1)
+        seen = np.isfinite(self.points.sum(axis=1))
         return seen if self.weights is None else seen & (self.weights > 0)
 
     @property
@@ -98,7 +106,7 @@ class Observation:
 
 
 def eye_distance(points: Array, scheme: Scheme) -> float:
-    """Distance of the two eye centres of `points` (L, k) in scheme order, in the points' unit; NaN if one is missing."""
+    """Distance of the eye centres of `points` (L, k) in scheme order, in their unit; NaN if one is missing."""
     right, left = (points[list(rows)].mean(axis=0) for rows in scheme.eyes)
     return float(np.linalg.norm(left - right))
 
@@ -119,14 +127,18 @@ def portrait_camera(
     the same size as one from near, and turning the head does not zoom. distance None is a far-away camera.
     """
     if distance is not None and not DISTANCES[0] <= distance <= DISTANCES[1]:
-        raise ValueError(f"distance: {distance:g} m is not within {DISTANCES[0]:g} to {DISTANCES[1]:g}")
+        raise ValueError(
+            f"distance: {distance:g} m is not within {DISTANCES[0]:g} to {DISTANCES[1]:g}"
+        )
     kappa = 0.0 if distance is None else 1.0 / distance
     points = face.vertices[face.model.scheme(scheme).vertices]
     frontal = Camera(rotation_from_angles(0, 0, 0), np.zeros(2), 1.0, kappa)
     s = eyes_px / eye_distance(project(frontal, points), face.model.scheme(scheme))
     camera = Camera(rotation_from_angles(yaw_deg, pitch_deg, roll_deg), np.zeros(2), s, kappa)
     if (depths(camera, points) <= 0).any():
-        raise ValueError(f"distance: at {distance:g} m a point lies behind the camera; take the photo from farther away")
+        raise ValueError(
+            f"distance: at {distance:g} m a point lies behind the camera; take the photo from farther away"
+        )
     return camera
 
 
@@ -154,7 +166,13 @@ def observe(
     if not 0 <= noise_percent <= 20:
         raise ValueError(f"noise_percent: {noise_percent:g} is not within 0 to 20")
     camera = portrait_camera(
-        face, distance=distance, scheme=scheme, yaw_deg=yaw_deg, pitch_deg=pitch_deg, roll_deg=roll_deg, eyes_px=eyes_px
+        face,
+        distance=distance,
+        scheme=scheme,
+        yaw_deg=yaw_deg,
+        pitch_deg=pitch_deg,
+        roll_deg=roll_deg,
+        eyes_px=eyes_px,
     )
     landmarks = face.model.scheme(scheme)
     side = round(5 * eyes_px)

@@ -3,8 +3,8 @@
 R(r) = I + a W + b W^2 with W = [r]x, a = sin t / t, b = (1 - cos t) / t^2, t = |r| (paper, appendix A). Half angles and
 `sinc` keep every digit near t = 0, where the printed form of dR/dr divides by t^2 (MATH.md 2, E7).
 
-The rotation of a face is R(r) R0 with R0 = diag(1, -1, -1): r = 0 is a frontal face, camera axes x right, y down, z away
-from the viewer (MATH.md 1).
+The rotation of a face is R(r) R0 with R0 = diag(1, -1, -1): r = 0 is a frontal face, camera axes x right, y down, z
+away from the viewer (MATH.md 1).
 """
 
 from __future__ import annotations
@@ -13,9 +13,15 @@ import numpy as np
 
 from .arrays import Array, checked
 
-R0 = np.diag([1.0, -1.0, -1.0])  # frontal: model y up, z out of the face -> camera y down, z forward
+R0 = np.diag(
+    [1.0, -1.0, -1.0]
+)  # frontal: model y up, z out of the face -> camera y down, z forward
 GENERATORS = np.array(
-    [[[0, 0, 0], [0, 0, -1], [0, 1, 0]], [[0, 0, 1], [0, 0, 0], [-1, 0, 0]], [[0, -1, 0], [1, 0, 0], [0, 0, 0]]],
+    [
+        [[0, 0, 0], [0, 0, -1], [0, 1, 0]],
+        [[0, 0, 1], [0, 0, 0], [-1, 0, 0]],
+        [[0, -1, 0], [1, 0, 0], [0, 0, 0]],
+    ],
     dtype=np.float64,
 )  # [e_i]x, index i first
 

@@ -23,11 +23,19 @@ class Head:
     vertices: Array  # (V, 3) metres
     faces: NDArray[np.uint32]  # (F, 3)
     colours: NDArray[np.uint8]  # (V, 3) sRGB
-    occlusion: NDArray[np.uint8] | None = None  # (V,) ambient occlusion, 255 open; darkens `colours`
-    lit: bool = True  # False: colours are values of a legend and are shown as they are, shading reduced
+    occlusion: NDArray[np.uint8] | None = (
+        None  # (V,) ambient occlusion, 255 open; darkens `colours`
+    )
+    lit: bool = (
+        True  # False: colours are values of a legend and are shown as they are, shading reduced
+    )
     slot: float = 0.0  # metres along the viewer's right
-    caption: tuple[tuple[str, str], ...] = ()  # lines under the head: (text, tone), tone "dim", "d_l" or "d_s"
-    coarse_faces: NDArray[np.uint32] | None = None  # over the first vertices: the mesh while a hand moves
+    caption: tuple[
+        tuple[str, str], ...
+    ] = ()  # lines under the head: (text, tone), tone "dim", "d_l" or "d_s"
+    coarse_faces: NDArray[np.uint32] | None = (
+        None  # over the first vertices: the mesh while a hand moves
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +64,9 @@ class Photo:
     occlusion: NDArray[np.uint8] | None
     focal: float  # pixels
     principal: tuple[float, float]  # pixels
-    fit_vertices: Array | None = None  # (V, 3) the fitted face in camera axes, for the view "camera"
+    fit_vertices: Array | None = (
+        None  # (V, 3) the fitted face in camera axes, for the view "camera"
+    )
     fit_focal: float | None = None  # pixels, per metre of depth as `focal`
 
 
@@ -109,7 +119,13 @@ class Scene:
     curves: Curves | None = None
     legend: Legend | None = None
     through_camera: bool = False  # the picture is the photo itself, fitted face beside true face
-    pivot: tuple[float, float, float] = (0.0, 0.0, 0.0)  # metres, model axes: where heads are centred and turn about
+    pivot: tuple[float, float, float] = (
+        0.0,
+        0.0,
+        0.0,
+    )  # metres, model axes: where heads are centred and turn about
     scale_bar: float = 0.05  # metres
     note: str = ""  # one line: model, subject, what is grey
-    landmarks: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.intp))  # (L,) vertices marked on heads
+    landmarks: IntArray = field(
+        default_factory=lambda: np.zeros(0, dtype=np.intp)
+    )  # (L,) vertices marked on heads

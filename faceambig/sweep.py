@@ -90,13 +90,19 @@ def sweep_distance(
     tolerance: float = 1e-8,
     max_steps: int = 100,
 ) -> Sweep:
-    """Fits at every distance (D,), metres (default: 49 from 0.2 to 3 m), and with the far-away camera; options as `fit`."""
+    """Fits at every distance (D,), metres (default: 49 from 0.2 to 3 m), and orthographic; options as `fit`."""
     options = FitOptions(modes, box, noise_percent, prior_weight, tolerance, max_steps)
-    grid = np.geomspace(*GRID) if distances is None else np.unique(checked("distances", distances, (None,)))
+    grid = (
+        np.geomspace(*GRID)
+        if distances is None
+        else np.unique(checked("distances", distances, (None,)))
+    )
     if not len(grid):
         raise ValueError("distances: at least one is needed")
     if grid[0] < NEAREST or grid[-1] > FARTHEST:
-        raise ValueError(f"distances: {grid[0]:g} to {grid[-1]:g} m is not within {NEAREST:g} to {FARTHEST:g}")
+        raise ValueError(
+            f"distances: {grid[0]:g} to {grid[-1]:g} m is not within {NEAREST:g} to {FARTHEST:g}"
+        )
     task = prepare(model, observation, options)
     camera = start_pose(task.problem, 0.0)
     orthographic = solve_from(task, camera, np.zeros(task.problem.modes.shape[2]))

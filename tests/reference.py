@@ -45,7 +45,9 @@ def pinhole(camera: Camera, points: np.ndarray) -> np.ndarray:
     return np.array([f * (camera.R @ p + t)[:2] / (camera.R @ p + t)[2] for p in points])
 
 
-def box_qp_by_enumeration(H: np.ndarray, g: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+def box_qp_by_enumeration(
+    H: np.ndarray, g: np.ndarray, low: np.ndarray, high: np.ndarray
+) -> np.ndarray:
     """The minimiser among all 3^n guesses of what sits on which bound."""
     n, best, best_value = len(g), np.zeros(len(g)), np.inf
     for guess in itertools.product((-1, 0, 1), repeat=n):
@@ -53,7 +55,9 @@ def box_qp_by_enumeration(H: np.ndarray, g: np.ndarray, low: np.ndarray, high: n
         d = np.where(a < 0, low, np.where(a > 0, high, 0.0))
         free = a == 0
         if free.any():
-            d[free] = np.linalg.solve(H[np.ix_(free, free)], g[free] - H[np.ix_(free, ~free)] @ d[~free])
+            d[free] = np.linalg.solve(
+                H[np.ix_(free, free)], g[free] - H[np.ix_(free, ~free)] @ d[~free]
+            )
         if (d >= low - 1e-12).all() and (d <= high + 1e-12).all():
             value = 0.5 * d @ H @ d - g @ d
             if value < best_value:
@@ -62,7 +66,7 @@ def box_qp_by_enumeration(H: np.ndarray, g: np.ndarray, low: np.ndarray, high: n
 
 
 def trf(problem: Problem, start: Solution, tolerance: float = 1e-15) -> float:
-    """The cost SciPy's trust-region reflective method reaches from `start`, all parameters free; a separate residual."""
+    """The cost SciPy's trust-region reflective method reaches from `start`; a residual of its own."""
     S = len(start.alpha)
     root = np.sqrt(problem.weights)
 
@@ -71,7 +75,10 @@ def trf(problem: Problem, start: Solution, tolerance: float = 1e-15) -> float:
         q = (problem.mean + problem.modes @ theta[:S]) @ camera.R.T
         x = camera.s * (q[:, :2] + camera.t) / (1 + camera.kappa * q[:, 2:])
         return np.concatenate(
-            [((x - problem.points) * root[:, None]).ravel(), np.sqrt(problem.prior_weight) * theta[:S]]
+            [
+                ((x - problem.points) * root[:, None]).ravel(),
+                np.sqrt(problem.prior_weight) * theta[:S],
+            ]
         )
 
     n = S + 6 + problem.free_distance
@@ -79,8 +86,17 @@ def trf(problem: Problem, start: Solution, tolerance: float = 1e-15) -> float:
     low[:S], high[:S] = -problem.box, problem.box
     if problem.free_distance:
         low[-1], high[-1] = -start.camera.kappa, 10.0 - start.camera.kappa
-    theta = np.concatenate([np.clip(start.alpha, 0.9999 * low[:S], 0.9999 * high[:S]), np.zeros(n - S)])
+    theta = np.concatenate(
+        [np.clip(start.alpha, 0.9999 * low[:S], 0.9999 * high[:S]), np.zeros(n - S)]
+    )
     found = least_squares(
-        residual, theta, bounds=(low, high), x_scale="jac", ftol=tolerance, xtol=tolerance, gtol=tolerance, max_nfev=400
+        residual,
+        theta,
+        bounds=(low, high),
+        x_scale="jac",
+        ftol=tolerance,
+        xtol=tolerance,
+        gtol=tolerance,
+        max_nfev=400,
     )
     return float(2 * found.cost)

@@ -10,7 +10,22 @@ from faceambig.model import FaceModel, Scheme, Subject
 from faceambig.rotation import rotation_from_angles
 
 # both sides of every switch and of every cancellation in rotation.py: uniform angles would never meet them
-CORNER_ANGLES = (0.0, 1e-160, 1e-15, 9.9e-16, 1.1e-15, 1e-9, 1e-8, 1e-4, 1.0, 2.69, 2.70, np.pi - 1e-3, np.pi - 1e-9, np.pi)
+CORNER_ANGLES = (
+    0.0,
+    1e-160,
+    1e-15,
+    9.9e-16,
+    1.1e-15,
+    1e-9,
+    1e-8,
+    1e-4,
+    1.0,
+    2.69,
+    2.70,
+    np.pi - 1e-3,
+    np.pi - 1e-9,
+    np.pi,
+)
 
 
 def directions() -> st.SearchStrategy[np.ndarray]:
@@ -23,7 +38,9 @@ def directions() -> st.SearchStrategy[np.ndarray]:
 def rotation_vectors() -> st.SearchStrategy[np.ndarray]:
     """Axis-angle vectors (3,): the corner list, and angles log-uniform from 1e-9 to pi."""
     log_uniform = st.floats(np.log(1e-9), np.log(np.pi)).map(np.exp)
-    return st.tuples(st.sampled_from(CORNER_ANGLES) | log_uniform, directions()).map(lambda p: p[0] * p[1])
+    return st.tuples(st.sampled_from(CORNER_ANGLES) | log_uniform, directions()).map(
+        lambda p: p[0] * p[1]
+    )
 
 
 def cameras() -> st.SearchStrategy[Camera]:
@@ -43,7 +60,9 @@ def tiny_model(n_vertices: int = 30, n_modes: int = 5, seed: int = 0) -> FaceMod
     names = tuple(str(i) for i in range(n_vertices))
     eyes = ((0, 1), (2, 3))
     mean[[0, 1, 2, 3]] = [[-0.045, 0, 0], [-0.02, 0, 0.01], [0.02, 0, 0.01], [0.045, 0, 0]]
-    scheme = Scheme("all", names, np.arange(n_vertices), ("mid",) * n_vertices, eyes, "mean of two corners each")
+    scheme = Scheme(
+        "all", names, np.arange(n_vertices), ("mid",) * n_vertices, eyes, "mean of two corners each"
+    )
     faces = np.array([[i, i + 1, i + 2] for i in range(n_vertices - 2)], dtype=np.uint32)
     return FaceModel("tiny", mean, modes, faces, {"all": scheme})
 

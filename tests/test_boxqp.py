@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from reference import box_qp_by_enumeration
 
 from faceambig.fitting.boxqp import solve_box_qp
+from reference import box_qp_by_enumeration
 
 
-def problem(seed: int, n: int, spread: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def problem(
+    seed: int, n: int, spread: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     rng = np.random.default_rng(seed)
     A = rng.normal(size=(n + 2, n))
     low, high = -rng.uniform(0.1, 2, n), rng.uniform(0.1, 2, n)
@@ -45,7 +47,9 @@ def test_it_ends_where_exchanging_whole_blocks_would_cycle():
         A = rng.normal(size=(8, 12)) + 3 * rng.normal(size=(8, 1))
         H = A.T @ A + 1e-6 * np.eye(12)
         g = 10 * rng.normal(size=12)
-        _, _, solved = solve_box_qp(H, g, -np.ones(12), np.ones(12), np.zeros(12, dtype=np.int8), 5000)
+        _, _, solved = solve_box_qp(
+            H, g, -np.ones(12), np.ones(12), np.zeros(12, dtype=np.int8), 5000
+        )
         assert solved, seed
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from hypothesis import given
-from reference import pinhole
-from strategies import cameras, tiny_model
 
 from faceambig.camera import Camera, camera_points, depths, jacobian, project
 from faceambig.fitting.solve import moved_camera
+from reference import pinhole
+from strategies import cameras, tiny_model
 
 MODEL = tiny_model()
 
@@ -18,7 +18,9 @@ MODEL = tiny_model()
 def test_it_is_the_pinhole_camera_at_every_distance(camera):
     points = MODEL.mean
     if camera.kappa > 0:
-        assert np.abs(project(camera, points) - pinhole(camera, points)).max() < 1e-9  # pixels of O(1e3)
+        assert (
+            np.abs(project(camera, points) - pinhole(camera, points)).max() < 1e-9
+        )  # pixels of O(1e3)
 
 
 @given(cameras())
@@ -57,7 +59,9 @@ def test_the_jacobian_equals_central_differences(camera):
         numeric[:, :, column] = (ends[0] - ends[1]) / (2 * h)
     for column in range(S + 7):
         scale = np.abs(numeric[:, :, column]).max()
-        assert np.abs(J - numeric)[:, :, column].max() < 1e-6 * scale + 1e-6  # issue: 1e-6 of the largest entry
+        assert (
+            np.abs(J - numeric)[:, :, column].max() < 1e-6 * scale + 1e-6
+        )  # issue: 1e-6 of the largest entry
 
 
 @given(cameras())

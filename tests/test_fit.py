@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from reference import trf
-from strategies import face_of, tiny_model
 
 import faceambig as fa
 from faceambig.camera import Camera, project
@@ -16,6 +14,8 @@ from faceambig.fitting.result import FitOptions
 from faceambig.fitting.solve import Solution, cost, kkt_error, solve
 from faceambig.model import replace_model
 from faceambig.rotation import angles_from_rotation, rotation_matrix
+from reference import trf
+from strategies import face_of, tiny_model
 
 MODEL = tiny_model(n_vertices=24, n_modes=6, seed=4)
 
@@ -34,7 +34,11 @@ CAMERAS = [("perspective", 0.5), ("perspective", None), ("orthographic", None)]
 
 
 @pytest.mark.parametrize(("camera", "distance"), CAMERAS)
-@given(seed=st.integers(0, 10_000), lam=st.sampled_from([0.01, 1.0, 30.0]), box=st.sampled_from([0.5, 2.0, None]))
+@given(
+    seed=st.integers(0, 10_000),
+    lam=st.sampled_from([0.01, 1.0, 30.0]),
+    box=st.sampled_from([0.5, 2.0, None]),
+)
 def test_no_optimiser_started_there_finds_a_lower_cost(camera, distance, seed, lam, box):
     options = FitOptions(box=box, prior_weight=lam, tolerance=1e-10)
     task = prepare(MODEL, drawn(seed), options)
@@ -59,7 +63,9 @@ def test_the_truth_is_found_again_without_noise_and_prior():
     obs = fa.observe(face, distance=0.6, scheme="all", yaw_deg=25, pitch_deg=-10, roll_deg=5)
     fit = fa.fit(MODEL, obs, distance=0.6, prior_weight=0.0, box=None, tolerance=1e-14)
     assert fit.converged
-    assert np.abs(fit.alpha - alpha).max() < 1e-6  # zero-residual problem: quadratic convergence to rounding
+    assert (
+        np.abs(fit.alpha - alpha).max() < 1e-6
+    )  # zero-residual problem: quadratic convergence to rounding
     assert fit.d_l_percent < 1e-7
     assert np.abs(np.array(angles_from_rotation(fit.camera.R)) - (25, -10, 5)).max() < 1e-5
     assert fit.translation[2] == pytest.approx(0.6, rel=1e-12)
@@ -75,10 +81,16 @@ def test_a_point_given_twice_equals_weight_two(seed):
     weights = np.ones(24)
     weights[5] = 2.0
     weighted = fa.Observation(obs.points, numbers, obs.image_size, weights=weights)
-    twice = fa.Observation(np.vstack([obs.points, obs.points[5:6]]), np.append(numbers, 5), obs.image_size)
-    a, b = (fa.fit(MODEL, o, distance=0.6, prior_weight=1.0, tolerance=1e-12) for o in (weighted, twice))
+    twice = fa.Observation(
+        np.vstack([obs.points, obs.points[5:6]]), np.append(numbers, 5), obs.image_size
+    )
+    a, b = (
+        fa.fit(MODEL, o, distance=0.6, prior_weight=1.0, tolerance=1e-12) for o in (weighted, twice)
+    )
     assert a.cost == pytest.approx(b.cost, rel=1e-9)
-    assert np.abs(a.alpha - b.alpha).max() < 1e-4  # lambda = 1 px^2 bounds the curvature from below: root of 1e-9 cost
+    assert (
+        np.abs(a.alpha - b.alpha).max() < 1e-4
+    )  # lambda = 1 px^2 bounds the curvature from below: root of 1e-9 cost
 
 
 @given(st.integers(0, 10_000))
@@ -87,7 +99,9 @@ def test_the_order_of_the_points_does_not_matter(seed):
     order = np.random.default_rng(seed).permutation(24)
     shuffled = fa.Observation(obs.points[order], order, obs.image_size)
     plain = fa.Observation(obs.points, np.arange(24), obs.image_size)
-    a, b = (fa.fit(MODEL, o, distance=0.6, prior_weight=1.0, tolerance=1e-12) for o in (shuffled, plain))
+    a, b = (
+        fa.fit(MODEL, o, distance=0.6, prior_weight=1.0, tolerance=1e-12) for o in (shuffled, plain)
+    )
     assert a.cost == pytest.approx(b.cost, rel=1e-9)
 
 
@@ -110,7 +124,9 @@ def test_missing_points_are_left_out_and_still_projected():
     assert fit.converged
     assert np.isnan(fit.residual[[7, 9]]).all()
     assert np.isfinite(fit.projected()).all()
-    assert np.abs(fit.projected()[7] - obs.points[7]).max() < 30  # px of 100 between the eyes: near where it was
+    assert (
+        np.abs(fit.projected()[7] - obs.points[7]).max() < 30
+    )  # px of 100 between the eyes: near where it was
 
 
 def test_a_missing_eye_corner_is_replaced_by_the_model_and_said():
@@ -119,7 +135,9 @@ def test_a_missing_eye_corner_is_replaced_by_the_model_and_said():
     points[0] = np.nan
     fit = fa.fit(MODEL, fa.Observation(points, "all", obs.image_size), distance=0.6)
     assert "eye corner is missing" in fit.interocular_meaning
-    assert fit.interocular_px == pytest.approx(fa.fit(MODEL, obs, distance=0.6).interocular_px, rel=0.3)
+    assert fit.interocular_px == pytest.approx(
+        fa.fit(MODEL, obs, distance=0.6).interocular_px, rel=0.3
+    )
 
 
 def test_a_fit_that_ran_out_of_steps_does_not_say_converged():
@@ -130,9 +148,13 @@ def test_a_fit_that_ran_out_of_steps_does_not_say_converged():
 
 def test_damping_is_no_convergence():
     # a start far off in the curved valley of a weak prior: full steps are refused first (MATH.md 3 a, b)
-    task = prepare(MODEL, drawn(3, noise_percent=0), FitOptions(prior_weight=1e-4, box=None, modes=6))
+    task = prepare(
+        MODEL, drawn(3, noise_percent=0), FitOptions(prior_weight=1e-4, box=None, modes=6)
+    )
     start = start_pose(task.problem, 1 / 0.2)
-    turned = Camera(rotation_matrix(np.array([0.0, 2.2, 0.0])) @ start.R, start.t, 0.3 * start.s, start.kappa)
+    turned = Camera(
+        rotation_matrix(np.array([0.0, 2.2, 0.0])) @ start.R, start.t, 0.3 * start.s, start.kappa
+    )
     found = solve(task.problem, turned, np.full(6, 3.0), tolerance=1e-9)
     if found.status == "converged":
         assert kkt_error(task.problem, found) < 1e-4
@@ -185,7 +207,9 @@ def test_bad_points_are_refused_by_name():
 
 
 def test_points_of_the_model_on_one_line_are_refused():
-    straight = replace_model(MODEL, control_mean=np.outer(np.linspace(-0.1, 0.1, 24), [1.0, 0.2, 0.1]))
+    straight = replace_model(
+        MODEL, control_mean=np.outer(np.linspace(-0.1, 0.1, 24), [1.0, 0.2, 0.1])
+    )
     with pytest.raises(ValueError, match="on the model they lie on one line"):
         fa.fit(straight, drawn(1), distance=0.6)
 
@@ -193,7 +217,9 @@ def test_points_of_the_model_on_one_line_are_refused():
 def test_noise_is_that_of_its_seed_and_size():
     face = face_of(MODEL, np.zeros(6))
     quiet = fa.observe(face, distance=1.0, scheme="all")
-    a, b, c = (fa.observe(face, distance=1.0, scheme="all", noise_percent=2.0, seed=s) for s in (1, 1, 2))
+    a, b, c = (
+        fa.observe(face, distance=1.0, scheme="all", noise_percent=2.0, seed=s) for s in (1, 1, 2)
+    )
     assert np.array_equal(a.points, b.points)
     assert not np.array_equal(a.points, c.points)
     # 48 normal numbers of sd 2 px: the sample sd lies within 40 % with probability 1 - 1e-4

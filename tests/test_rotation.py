@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from reference import rotation_series, rotation_series_derivative
-from strategies import CORNER_ANGLES, directions, rotation_vectors
 
 from faceambig.rotation import (
     R0,
@@ -17,6 +15,8 @@ from faceambig.rotation import (
     rotation_jacobian,
     rotation_matrix,
 )
+from reference import rotation_series, rotation_series_derivative
+from strategies import CORNER_ANGLES, directions, rotation_vectors
 
 
 @given(rotation_vectors())
@@ -43,8 +43,12 @@ def test_the_derivative_equals_that_of_the_power_series(r):
 def test_the_small_part_of_the_derivative_keeps_its_digits(axis, angle):
     # dR/dr - dR/dr(0) is of order |r|: compare relative to it, not to 1
     small = rotation_jacobian(angle * axis) - rotation_jacobian(np.zeros(3))
-    exact = (rotation_series_derivative(angle * axis) - rotation_series_derivative(np.zeros(3))).astype(float)
-    assert np.abs(small - exact).max() <= 1e-6 * angle + 2e-16  # 2e-16: adding to generators of size 1
+    exact = (
+        rotation_series_derivative(angle * axis) - rotation_series_derivative(np.zeros(3))
+    ).astype(float)
+    assert (
+        np.abs(small - exact).max() <= 1e-6 * angle + 2e-16
+    )  # 2e-16: adding to generators of size 1
 
 
 @given(rotation_vectors())
@@ -59,7 +63,9 @@ def test_the_axis_angle_comes_back(r):
 @given(st.floats(-89, 89), st.floats(-89, 89), st.floats(-179, 179))
 def test_yaw_pitch_and_roll_come_back(yaw, pitch, roll):
     back = angles_from_rotation(rotation_from_angles(yaw, pitch, roll))
-    assert np.abs(np.array(back) - (yaw, pitch, roll)).max() < 1e-9  # degrees; pitch 89 costs two digits
+    assert (
+        np.abs(np.array(back) - (yaw, pitch, roll)).max() < 1e-9
+    )  # degrees; pitch 89 costs two digits
 
 
 def test_the_frontal_face_looks_at_the_camera_upright():

@@ -51,7 +51,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(arguments)
     try:
         return options.run(options)
-    except (ValueError, OSError, RuntimeError) as error:  # AssetError and ServeError are among these
+    except (
+        ValueError,
+        OSError,
+        RuntimeError,
+    ) as error:  # AssetError and ServeError are among these
         print(f"faceambig {options.command}: {one_line(error)}", file=sys.stderr)
         return BAD_INPUT
     except KeyboardInterrupt:
@@ -68,56 +72,115 @@ def one_line(error: BaseException) -> str:
 def parser() -> Parser:
     """All commands and their flags; those of a picture come from the field table."""
     root = Parser(prog="faceambig", description="A photograph of a face does not fix the face.")
-    commands = root.add_subparsers(dest="command", required=True, parser_class=Parser, metavar="COMMAND")
+    commands = root.add_subparsers(
+        dest="command", required=True, parser_class=Parser, metavar="COMMAND"
+    )
     _serve(commands.add_parser("serve", help="open the page on this machine"))
-    _snapshot(commands.add_parser("snapshot", help="draw the page's picture of a state, without a browser"))
+    _snapshot(
+        commands.add_parser(
+            "snapshot", help="draw the page's picture of a state, without a browser"
+        )
+    )
     _fit(commands.add_parser("fit", help="fit a face to the points of a photograph"))
     _sweep(commands.add_parser("sweep", help="fit at many distances"))
     return root
 
 
 def _serve(command: argparse.ArgumentParser) -> None:
-    command.add_argument("--host", default="127.0.0.1", help="address to listen on; only this machine's own (default 127.0.0.1)")
+    command.add_argument(
+        "--host",
+        default="127.0.0.1",
+        help="address to listen on; only this machine's own (default 127.0.0.1)",
+    )
     command.add_argument("--port", type=int, default=8080, help="port (default 8080)")
     command.set_defaults(run=run_serve)
 
 
 def _snapshot(command: argparse.ArgumentParser) -> None:
-    command.add_argument("--out", required=True, metavar="FILE.png", help="where to write the picture")
+    command.add_argument(
+        "--out", required=True, metavar="FILE.png", help="where to write the picture"
+    )
     command.add_argument("--width", type=int, metavar="PX", help="width of the picture")
     command.add_argument("--height", type=int, metavar="PX", help="height of the picture")
-    command.add_argument("--model", default=DEFAULT.model, help="model name or path (default embedded)")
+    command.add_argument(
+        "--model", default=DEFAULT.model, help="model name or path (default embedded)"
+    )
     for field in FIELDS.values():
-        unit = f" [{field.low:g} to {field.high:g}]" if not field.choices else f" [{', '.join(field.choices)}]"
+        unit = (
+            f" [{field.low:g} to {field.high:g}]"
+            if not field.choices
+            else f" [{', '.join(field.choices)}]"
+        )
         default = getattr(DEFAULT, field.name)
         command.add_argument(
-            field.flag, dest=field.name, metavar=field.name.upper(), help=f"{HELP[field.name]}{unit} (default {default})"
+            field.flag,
+            dest=field.name,
+            metavar=field.name.upper(),
+            help=f"{HELP[field.name]}{unit} (default {default})",
         )
     command.set_defaults(run=run_snapshot)
 
 
 def _points(command: argparse.ArgumentParser) -> None:
-    command.add_argument("points", metavar="FILE.pts", help="landmarks of the photograph (68 points of iBUG)")
-    command.add_argument("--model", default="embedded", help="model name or path (default embedded)")
-    command.add_argument("--image-size", metavar="WxH", help="size of the picture in pixels, if it does not lie beside the points")
+    command.add_argument(
+        "points", metavar="FILE.pts", help="landmarks of the photograph (68 points of iBUG)"
+    )
+    command.add_argument(
+        "--model", default="embedded", help="model name or path (default embedded)"
+    )
+    command.add_argument(
+        "--image-size",
+        metavar="WxH",
+        help="size of the picture in pixels, if it does not lie beside the points",
+    )
     command.add_argument("--modes", type=int, default=70, help="shape modes used (default 70)")
-    command.add_argument("--box", type=float, default=2.0, help="largest shape coefficient, sd (default 2)")
-    command.add_argument("--prior", type=float, default=1.0, help="landmark noise assumed, %% of the eye distance (default 1)")
+    command.add_argument(
+        "--box", type=float, default=2.0, help="largest shape coefficient, sd (default 2)"
+    )
+    command.add_argument(
+        "--prior",
+        type=float,
+        default=1.0,
+        help="landmark noise assumed, %% of the eye distance (default 1)",
+    )
     command.add_argument("--json", action="store_true", help="print JSON for programs")
 
 
 def _fit(command: argparse.ArgumentParser) -> None:
     _points(command)
-    command.add_argument("--distance", type=float, metavar="M", help="assumed camera distance, metres; left out: fitted too")
-    command.add_argument("--camera", default="perspective", help="perspective or orthographic (default perspective)")
+    command.add_argument(
+        "--distance",
+        type=float,
+        metavar="M",
+        help="assumed camera distance, metres; left out: fitted too",
+    )
+    command.add_argument(
+        "--camera", default="perspective", help="perspective or orthographic (default perspective)"
+    )
     command.set_defaults(run=run_fit)
 
 
 def _sweep(command: argparse.ArgumentParser) -> None:
     _points(command)
-    command.add_argument("--from", dest="low", type=float, default=0.2, metavar="M", help="nearest distance (default 0.2)")
-    command.add_argument("--to", dest="high", type=float, default=3.0, metavar="M", help="farthest distance (default 3)")
-    command.add_argument("--steps", type=int, default=13, help="distances, evenly in ratio (default 13)")
+    command.add_argument(
+        "--from",
+        dest="low",
+        type=float,
+        default=0.2,
+        metavar="M",
+        help="nearest distance (default 0.2)",
+    )
+    command.add_argument(
+        "--to",
+        dest="high",
+        type=float,
+        default=3.0,
+        metavar="M",
+        help="farthest distance (default 3)",
+    )
+    command.add_argument(
+        "--steps", type=int, default=13, help="distances, evenly in ratio (default 13)"
+    )
     command.set_defaults(run=run_sweep)
 
 
@@ -145,7 +208,11 @@ def run_snapshot(options: argparse.Namespace) -> int:
 
 def state_of(options: argparse.Namespace) -> ViewState:
     """The state of the flags given."""
-    given = {name: parse(field, getattr(options, name)) for name, field in FIELDS.items() if getattr(options, name) is not None}
+    given = {
+        name: parse(field, getattr(options, name))
+        for name, field in FIELDS.items()
+        if getattr(options, name) is not None
+    }
     return ViewState(model=options.model, **given)
 
 
@@ -161,10 +228,16 @@ def run_fit(options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps(fit_record(fit) | notes))
     else:
-        where = "far away (orthographic)" if fit.distance is None else f"{100 * fit.distance:.3g} cm"
-        print(f"{fit.status}: camera at {where}, landmark error d_L {fit.d_l_percent:.2f} % of the interocular distance")
+        where = (
+            "far away (orthographic)" if fit.distance is None else f"{100 * fit.distance:.3g} cm"
+        )
+        print(
+            f"{fit.status}: camera at {where}, landmark error d_L {fit.d_l_percent:.2f} % of the interocular distance"
+        )
         print(f"interocular distance: {fit.interocular_px:.1f} px, {fit.interocular_meaning}")
-        print(f"principal point: {notes['principal_point']}; picture size: {notes['image_size_from']}")
+        print(
+            f"principal point: {notes['principal_point']}; picture size: {notes['image_size_from']}"
+        )
     return GOOD if fit.converged else NOT_CONVERGED
 
 
@@ -187,7 +260,12 @@ def run_sweep(options: argparse.Namespace) -> int:
     interval = sweep.interval()
     fits = (*sweep.fits, sweep.orthographic)
     if options.json:
-        span = {"low_m": interval.low, "high_m": interval.high, "empty": interval.empty, "tolerance_percent": interval.tolerance_percent}
+        span = {
+            "low_m": interval.low,
+            "high_m": interval.high,
+            "empty": interval.empty,
+            "tolerance_percent": interval.tolerance_percent,
+        }
         print(json.dumps({"fits": [fit_record(fit) for fit in fits], "interval": span} | notes))
     else:
         print("distance cm   d_L %   status")
@@ -195,8 +273,12 @@ def run_sweep(options: argparse.Namespace) -> int:
             name = "orthographic" if fit.distance is None else f"{100 * fit.distance:.4g}"
             print(f"{name:>12} {fit.d_l_percent:7.3f}   {fit.status}")
         print(interval_words(interval))
-        print(f"interocular distance: {fits[0].interocular_px:.1f} px, {fits[0].interocular_meaning}")
-        print(f"principal point: {notes['principal_point']}; picture size: {notes['image_size_from']}")
+        print(
+            f"interocular distance: {fits[0].interocular_px:.1f} px, {fits[0].interocular_meaning}"
+        )
+        print(
+            f"principal point: {notes['principal_point']}; picture size: {notes['image_size_from']}"
+        )
     return GOOD if all(fit.converged for fit in fits) else NOT_CONVERGED
 
 

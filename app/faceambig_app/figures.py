@@ -65,8 +65,11 @@ def hidden_boxes(uuids: Iterable[str]) -> str:
 
 def heading(assumed: float | None, actual: float, points: int) -> str:
     """The first words of the page."""
-    lead = say("app.lead", actual=distance_text(actual), assumed=distance_text(assumed), points=points)
-    return f'<div class="fa"><h1>{escape(say("app.heading"))}</h1><p>{escape(lead)}</p><p>{escape(say("app.try"))}</p></div>'
+    lead = say(
+        "app.lead", actual=distance_text(actual), assumed=distance_text(assumed), points=points
+    )
+    title, task = escape(say("app.heading")), escape(say("app.try"))
+    return f'<div class="fa"><h1>{title}</h1><p>{escape(lead)}</p><p>{task}</p></div>'
 
 
 def cards(numbers: Numbers) -> str:
@@ -79,15 +82,25 @@ def cards(numbers: Numbers) -> str:
     warned = f'<p class="fa-warn">{escape(warning)}</p>' if warning else ""
     return (
         '<div class="fa"><div class="fa-cards">'
-        + _card("fa-dl", say("number.d_l"), percent_number(numbers.d_l_percent), "%", say("number.d_l_note"), numbers.eyes_meaning)
-        + _card("fa-ds", say("number.d_s"), f"{numbers.d_s_mm:.1f}", "mm", say("number.d_s_note"), "")
+        + _card(
+            "fa-dl",
+            say("number.d_l"),
+            percent_number(numbers.d_l_percent),
+            "%",
+            say("number.d_l_note"),
+            numbers.eyes_meaning,
+        )
+        + _card(
+            "fa-ds", say("number.d_s"), f"{numbers.d_s_mm:.1f}", "mm", say("number.d_s_note"), ""
+        )
         + f"</div>{warned}</div>"
     )
 
 
 def flex_words(words: str, low: float, high: float) -> str:
     """What mode A moves, and how far it stays a face."""
-    return f'<div class="fa"><small>{escape(say("flex.words", words=words, low=f"{low:.1f}", high=f"{high:.1f}"))}</small></div>'
+    text = say("flex.words", words=words, low=f"{low:.1f}", high=f"{high:.1f}")
+    return f'<div class="fa"><small>{escape(text)}</small></div>'
 
 
 def _card(tone: str, title: str, value: str, unit: str, note: str, hint: str) -> str:
@@ -137,7 +150,9 @@ def side_by_side(marks: str, numbers: str) -> str:
 
 
 def _cross(x: float, y: float, r: float) -> str:
-    return f"M{x - r:.1f} {y - r:.1f}l{2 * r:.1f} {2 * r:.1f}m0 {-2 * r:.1f}l{-2 * r:.1f} {2 * r:.1f}"
+    return (
+        f"M{x - r:.1f} {y - r:.1f}l{2 * r:.1f} {2 * r:.1f}m0 {-2 * r:.1f}l{-2 * r:.1f} {2 * r:.1f}"
+    )
 
 
 def _circle(x: float, y: float, r: float) -> str:
@@ -155,15 +170,21 @@ def plots(curves: Curves, numbers: Numbers) -> str:
     d_l = _line(x, _y(curves.d_l_percent, D_L_MAX, D_L_TOP, D_L_BOTTOM))
     d_s = _line(x, _y(curves.d_s_mm, top, D_S_TOP, D_S_BOTTOM))
     parts = [
-        f'<svg class="fa-plot" viewBox="0 0 {WIDTH} 262" role="img" aria-label="{escape(say("plot.d_l"))}, '
-        f'{escape(say("plot.d_s"))}">',
+        (
+            f'<svg class="fa-plot" viewBox="0 0 {WIDTH} 262" role="img" aria-label="{escape(say("plot.d_l"))}, '
+            f'{escape(say("plot.d_s"))}">'
+        ),
         f'<text class="t" x="2" y="14" style="fill:var(--fa-dl)">{escape(say("plot.d_l"))}</text>',
-        f'<rect x="{LEFT}" y="{_at(curves.tolerance_percent, D_L_MAX, D_L_TOP, D_L_BOTTOM):.1f}" '
-        f'width="{RIGHT - LEFT}" height="{(D_L_BOTTOM - D_L_TOP) * curves.tolerance_percent / D_L_MAX:.1f}" '
-        'fill="var(--fa-band)"/>',
+        (
+            f'<rect x="{LEFT}" y="{_at(curves.tolerance_percent, D_L_MAX, D_L_TOP, D_L_BOTTOM):.1f}" '
+            f'width="{RIGHT - LEFT}" height="{(D_L_BOTTOM - D_L_TOP) * curves.tolerance_percent / D_L_MAX:.1f}" '
+            'fill="var(--fa-band)"/>'
+        ),
         *(_grid(value, D_L_MAX, D_L_TOP, D_L_BOTTOM) for value in (0, 3, 6)),
-        f'<text x="{RIGHT - 3}" y="{_at(3, D_L_MAX, D_L_TOP, D_L_BOTTOM) + 13:.1f}" text-anchor="end">'
-        f"{escape(say('plot.band'))}</text>",
+        (
+            f'<text x="{RIGHT - 3}" y="{_at(3, D_L_MAX, D_L_TOP, D_L_BOTTOM) + 13:.1f}" text-anchor="end">'
+            f"{escape(say('plot.band'))}</text>"
+        ),
         f'<text class="t" x="2" y="{D_S_TOP - 10}" style="fill:var(--fa-ds)">{escape(say("plot.d_s"))}</text>',
         *(_grid(value, top, D_S_TOP, D_S_BOTTOM) for value in range(0, int(top) + 1, 4)),
         *(_tick(cm) for cm in TICKS_CM),

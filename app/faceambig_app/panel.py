@@ -7,7 +7,7 @@ number field beside it for exact values.
 from __future__ import annotations
 
 import math
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable, Coroutine
 from typing import Any
 
 import viser
@@ -17,7 +17,7 @@ from .state import FIELDS, Field, ViewState
 from .text import distance_text, say
 
 Say = Callable[[dict[str, Any]], None]
-Listener = Callable[[viser.GuiEvent[Any]], Awaitable[None]]
+Listener = Callable[[viser.GuiEvent[Any]], Coroutine[Any, Any, None]]
 
 STEPS_PER_OCTAVE = 24.0  # of a distance slider: 2.9 % a step
 MARKS_CM = (20, 30, 60, 120, 240)
@@ -27,7 +27,9 @@ VIEWS = FIELDS["view"].choices
 class Panel:
     """The widgets of one room."""
 
-    def __init__(self, gui: viser.GuiApi, state: ViewState, people: tuple[str, ...], say_change: Say) -> None:
+    def __init__(
+        self, gui: viser.GuiApi, state: ViewState, people: tuple[str, ...], say_change: Say
+    ) -> None:
         self._gui, self._say = gui, say_change
         self._people = people
         self._build_distance(state)
@@ -43,17 +45,25 @@ class Panel:
     def build_rest(self, state: ViewState) -> None:
         """The controls below the numbers and plots."""
         self._subject = self._gui.add_dropdown(
-            say("field.subject"), self._people, initial_value=self._people[state.subject - 1], hint=say("field.subject_hint")
+            say("field.subject"),
+            self._people,
+            initial_value=self._people[state.subject - 1],
+            hint=say("field.subject_hint"),
         )
         self._subject.on_update(self._heard("subject", lambda name: self._people.index(name) + 1))
         self._actual = self._distance_slider("actual", state.actual)
         self._view = self._gui.add_button_group(
-            say("field.view"), tuple(say(f"view.{name}") for name in VIEWS), hint=say("field.view_hint")
+            say("field.view"),
+            tuple(say(f"view.{name}") for name in VIEWS),
+            hint=say("field.view_hint"),
         )
         by_label = {say(f"view.{name}"): name for name in VIEWS}
         self._view.on_click(self._heard("view", by_label.__getitem__))
         with self._gui.add_folder(say("folder.pose"), expand_by_default=False):
-            self._pose = {name: self._linear_slider(name, getattr(state, name)) for name in ("yaw", "pitch", "roll")}
+            self._pose = {
+                name: self._linear_slider(name, getattr(state, name))
+                for name in ("yaw", "pitch", "roll")
+            }
         with self._gui.add_folder(say("folder.flex"), expand_by_default=False):
             self._flex = self._linear_slider("flex", state.flex)
             zero = self._gui.add_button(say("flex.zero"))
@@ -66,7 +76,7 @@ class Panel:
         return self._distance._impl.uuid, self._actual._impl.uuid
 
     def show(self, state: ViewState) -> None:
-        """Write a state into the widgets. On the event loop only, so a newer value is never overwritten by an older one."""
+        """Write a state into the widgets; on the event loop only, so an older value never overwrites a newer one."""
         self._distance.value = to_step(FIELDS["distance"], state.distance)
         self._distance_cm.value = centimetres(state.distance)
         self._actual.value = to_step(FIELDS["actual"], state.actual)
@@ -77,8 +87,13 @@ class Panel:
 
     def spoken(self, state: ViewState) -> str:
         """Data for the page's script: the button that is on, and what a screen reader says for a distance slider."""
-        texts = {say(f"field.{name}"): distance_text(getattr(state, name)) for name in ("distance", "actual")}
-        return data_html("pressed", {say("field.view"): say(f"view.{state.view}")}) + data_html("valuetext", texts)
+        texts = {
+            say(f"field.{name}"): distance_text(getattr(state, name))
+            for name in ("distance", "actual")
+        }
+        return data_html("pressed", {say("field.view"): say(f"view.{state.view}")}) + data_html(
+            "valuetext", texts
+        )
 
     def _distance_slider(self, name: str, value: float) -> viser.GuiSliderHandle[int]:
         field = FIELDS[name]
@@ -93,7 +108,12 @@ class Panel:
     def _linear_slider(self, name: str, value: float) -> viser.GuiSliderHandle[float]:
         field = FIELDS[name]
         handle = self._gui.add_slider(
-            say(f"field.{name}"), float(field.low), float(field.high), float(field.step), float(value), hint=say(f"field.{name}_hint")
+            say(f"field.{name}"),
+            float(field.low),
+            float(field.high),
+            float(field.step),
+            float(value),
+            hint=say(f"field.{name}_hint"),
         )
         handle.on_update(self._heard(name, float))
         return handle

@@ -57,11 +57,18 @@ def model(name: str) -> FaceModel:
 def photograph(target: Target) -> Photograph:
     """The synthetic photograph of a target."""
     subject = model(target.model).subject(target.subject)
-    pose = {"scheme": target.scheme, "yaw_deg": target.yaw, "pitch_deg": target.pitch, "roll_deg": target.roll}
+    pose = {
+        "scheme": target.scheme,
+        "yaw_deg": target.yaw,
+        "pitch_deg": target.pitch,
+        "roll_deg": target.roll,
+    }
     observation = fa.observe(
         subject, distance=target.actual, noise_percent=target.noise, seed=target.seed, **pose
     )
-    return Photograph(subject, observation, portrait_camera(subject, distance=target.actual, **pose))
+    return Photograph(
+        subject, observation, portrait_camera(subject, distance=target.actual, **pose)
+    )
 
 
 @lru_cache(maxsize=2048)
@@ -126,7 +133,9 @@ def frame(state: ViewState, *, with_curves: bool = True) -> Frame:
     target, fitting = state.target, state.fitting
     taken = photograph(target)
     shown = face(target, fitting, state.bend)
-    scene = _scene(target, shown, state.look, curve_of(state) if with_curves else None, _note(taken, target))
+    scene = _scene(
+        target, shown, state.look, curve_of(state) if with_curves else None, _note(taken, target)
+    )
     if not with_curves:
         return Frame(state, scene, "", (0.0, 0.0))
     modes = bending(target, fitting)
@@ -145,7 +154,7 @@ def curve_of(state: ViewState) -> Curves:
 
 @lru_cache(maxsize=64)
 def photo_jpeg(target: Target, draft: bool) -> bytes:
-    """The photograph as a JPEG for the page; a draft is small and from the coarse mesh, for while a hand turns the head."""
+    """The photograph as a JPEG for the page; a draft is small and coarse, for while a hand turns the head."""
     import cv2  # 75 ms to import: only where a picture is made
 
     from faceambig.render.painter import paint_photo
@@ -163,7 +172,10 @@ def row(state: ViewState) -> Scene:
     target = state.target
     taken = photograph(target)
     faces = [face(target, state.fitting._replace(distance=d), state.bend) for d in ROW_DISTANCES]
-    titles = [say("head.true"), *(say("head.assumed", distance=centimetres(d)) for d in ROW_DISTANCES)]
+    titles = [
+        say("head.true"),
+        *(say("head.assumed", distance=centimetres(d)) for d in ROW_DISTANCES),
+    ]
     captions = [((_taken(target), "dim"),)]
     captions += [
         (
@@ -184,14 +196,24 @@ def row(state: ViewState) -> Scene:
 
 
 def snapshot(
-    state: ViewState, path: str | Path | None = None, *, width: int | None = None, height: int | None = None
+    state: ViewState,
+    path: str | Path | None = None,
+    *,
+    width: int | None = None,
+    height: int | None = None,
 ) -> np.ndarray:
     """The page's picture of a state, drawn off-screen: (H, W, 4) uint8 RGBA, and a PNG file if `path` is given."""
-    from faceambig.render.overlay import draw, encode_png  # pyrender and OpenCV only when a picture is asked for
+    from faceambig.render.overlay import (
+        draw,
+        encode_png,
+    )  # pyrender and OpenCV only when a picture is asked for
 
     picture = draw(frame(state).scene, width, height)
     if path is not None:
-        write(Path(path), encode_png(picture, {"Software": "faceambig", "ViewState": state_json(state)}))
+        write(
+            Path(path),
+            encode_png(picture, {"Software": "faceambig", "ViewState": state_json(state)}),
+        )
     return picture
 
 
@@ -250,7 +272,9 @@ def _taken(target: Target) -> str:
 
 
 def _note(taken: Photograph, target: Target) -> str:
-    noise = say("note.noise", percent=f"{target.noise:g}") if target.noise else say("note.noise_free")
+    noise = (
+        say("note.noise", percent=f"{target.noise:g}") if target.noise else say("note.noise_free")
+    )
     return say(
         "note.snapshot",
         points=len(taken.observation.points),

@@ -35,7 +35,9 @@ class Painter(Protocol):
 class Room:
     """One browser: the newest ViewState, and nothing derived from it."""
 
-    def __init__(self, state: ViewState, painter: Painter, ring: Callable[[Room, float], None]) -> None:
+    def __init__(
+        self, state: ViewState, painter: Painter, ring: Callable[[Room, float], None]
+    ) -> None:
         self.state = state
         self.left = False
         self._painter, self._ring = painter, ring
@@ -43,7 +45,7 @@ class Room:
         self._resting: ViewState | None = None  # the state that was last drawn in full
 
     def hear(self, values: dict[str, Any]) -> None:
-        """Take a change of some fields, already in range. Called on the event loop only: one writer, in message order."""
+        """Take a change of some fields, already in range. On the event loop only: one writer, in message order."""
         self.go(changed(self.state, **values))
 
     def go(self, state: ViewState) -> None:
@@ -69,7 +71,7 @@ class Room:
             return
         try:
             self._painter.draw(state, draft)
-        except Exception as error:  # noqa: BLE001  anything may go wrong in a fit; the worker and the last frame must survive
+        except Exception as error:  # noqa: BLE001 - a fit may fail in any way; worker and last frame must survive
             if not self.left:
                 self._painter.refuse(error)
             draft = False
@@ -84,13 +86,16 @@ class Dispatcher:
     def __init__(self, serve: Callable[[Any], None] = Room.serve, workers: int = WORKERS) -> None:
         self._serve = serve
         self._changed = threading.Condition()
-        self._waiting: dict[Any, None] = {}  # used as a set that keeps order: the place in the line is kept
+        self._waiting: dict[
+            Any, None
+        ] = {}  # used as a set that keeps order: the place in the line is kept
         self._served: set[Any] = set()
         self._later: list[tuple[float, int, Any]] = []  # (monotonic seconds, running number, room)
         self._number = itertools.count()
         self._closed = False
         self._threads = [
-            threading.Thread(target=self._work, name=f"faceambig-worker-{n}", daemon=True) for n in range(workers)
+            threading.Thread(target=self._work, name=f"faceambig-worker-{n}", daemon=True)
+            for n in range(workers)
         ]
         for thread in self._threads:
             thread.start()
@@ -121,7 +126,9 @@ class Dispatcher:
                     self._changed.wait(self._until_later())
                 if self._closed:
                     return
-                del self._waiting[room]  # before the state is read: a ring from here on is a new turn
+                del self._waiting[
+                    room
+                ]  # before the state is read: a ring from here on is a new turn
                 self._served.add(room)
             try:
                 self._serve(room)

@@ -1,4 +1,7 @@
-"""The page: a server, and a Room with its Panel and Stage for every browser. One way: event -> state -> compute -> draw."""
+"""The page: a server, and a Room with its Panel and Stage for every browser.
+
+One way: event -> state -> compute -> draw.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +40,12 @@ class Browser:
 
     def _build(self, client: viser.ClientHandle) -> None:
         state, gui = self.room.state, client.gui
-        gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(27, 95, 193), control_width="large")
+        gui.configure_theme(
+            show_logo=False,
+            show_share_button=False,
+            brand_color=(27, 95, 193),
+            control_width="large",
+        )
         gui.set_panel_label(say("app.title"))
         people = tuple(subject.name for subject in model(state.model).subjects)
         phone = self.stage.phone
@@ -46,7 +54,11 @@ class Browser:
             self._add_photo(gui)
         self.panel = Panel(gui, state, people, self._heard)
         self._cards = None if phone else gui.add_html("")
-        self._plots, self._spoken, self._words = gui.add_html(""), gui.add_html(""), gui.add_html("")
+        self._plots, self._spoken, self._words = (
+            gui.add_html(""),
+            gui.add_html(""),
+            gui.add_html(""),
+        )
         self.panel.build_rest(state)
         self._style.content = figures.STYLE + figures.hidden_boxes(self.panel.index_sliders)
         self._heading: viser.GuiHtmlHandle | None = None
@@ -96,7 +108,9 @@ class Browser:
         if not draft or key == self._curves_of:  # a new target's curves cost a sweep: only at rest
             html.append((self._plots, figures.plots(curve_of(state), numbers)))
             self._curves_of = key
-        if (state.target, draft) != self._picture_of and not (draft and self._picture_of == (state.target, False)):
+        if (state.target, draft) != self._picture_of and not (
+            draft and self._picture_of == (state.target, False)
+        ):
             html.append((self._picture, figures.photo_picture(photo_jpeg(state.target, draft))))
             self._picture_of = (state.target, draft)
         if not draft:
@@ -138,7 +152,9 @@ class Page:
         self._server.on_client_connect(self._enter)
         self._server.on_client_disconnect(self._leave)
 
-    async def _enter(self, client: viser.ClientHandle) -> None:  # async: on the loop, before any message of this client
+    async def _enter(
+        self, client: viser.ClientHandle
+    ) -> None:  # async: on the loop, before any message of this client
         browser = Browser(client, self._dispatcher)
         self._browsers[client.client_id] = browser
         browser.open()
@@ -168,8 +184,20 @@ class Page:
 def refusal(control: Any, asked: object, put: object) -> str:
     """The notice for a value a control may not have."""
     low, high = getattr(control, "min", None), getattr(control, "max", None)
-    if isinstance(asked, (int, float)) and isinstance(put, (int, float)) and low is not None and high is not None:
-        return say("error.range", label=control.label, value=f"{asked:g}", low=f"{low:g}", high=f"{high:g}", near=f"{put:g}")
+    if (
+        isinstance(asked, (int, float))
+        and isinstance(put, (int, float))
+        and low is not None
+        and high is not None
+    ):
+        return say(
+            "error.range",
+            label=control.label,
+            value=f"{asked:g}",
+            low=f"{low:g}",
+            high=f"{high:g}",
+            near=f"{put:g}",
+        )
     return say("error.number")
 
 

@@ -24,7 +24,9 @@ HALF_WIDTH = 0.255  # metres: both heads and a little air
 TITLE_AT, BAR_AT = 0.155, -0.165  # metres above and below the pivot
 PHONE = 577  # pixels: at most 576 wide, viser shows its panel as a sheet over the lower part
 PHONE_HEADS_AT = 0.19  # share of the height, from the top, where the heads stand above the sheet
-TO_WORLD = np.array([1.0, -1.0, -1.0])  # camera axes (y down, z forward) to the page's (y up, z to the viewer)
+TO_WORLD = np.array(
+    [1.0, -1.0, -1.0]
+)  # camera axes (y down, z forward) to the page's (y up, z to the viewer)
 OCCLUSION_POWER = 1.3  # without it nostrils and ears glow (no shadows)
 BACKGROUND = {False: (243, 246, 249), True: (24, 28, 33)}  # light, dark
 LIGHTS = (  # direction towards the light in viewer axes (right, up, back), colour, intensity: key from above left
@@ -77,7 +79,13 @@ class Stage:
         self._size = (camera.image_width, camera.image_height)
         half = max(view.half_height, HALF_WIDTH * camera.image_height / max(1, camera.image_width))
         azimuth, elevation = np.radians((view.azimuth_deg, view.elevation_deg))
-        back = np.array([np.sin(azimuth) * np.cos(elevation), np.sin(elevation), np.cos(azimuth) * np.cos(elevation)])
+        back = np.array(
+            [
+                np.sin(azimuth) * np.cos(elevation),
+                np.sin(elevation),
+                np.cos(azimuth) * np.cos(elevation),
+            ]
+        )
         right = np.array([np.cos(azimuth), 0.0, -np.sin(azimuth)])
         up = np.cross(back, right)
         centre = -(1 - 2 * PHONE_HEADS_AT) * half * up if self.phone else np.zeros(3)
@@ -140,7 +148,9 @@ class Stage:
         scene.add_light_ambient("/ambient", intensity=1.0)
         self._lights = scene.add_frame("/light", show_axes=False)
         for name, towards, colour, intensity in LIGHTS:
-            scene.add_light_directional(f"/light/{name}", color=colour, intensity=intensity, position=towards)
+            scene.add_light_directional(
+                f"/light/{name}", color=colour, intensity=intensity, position=towards
+            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,12 +187,20 @@ class HeadNodes:
         self._title = scene.add_label(
             f"{root}/board/title", head.title, position=(0.0, TITLE_AT, 0.0), anchor="bottom-center"
         )
-        bar = np.array([[[-0.025, 0, 0], [0.025, 0, 0]], [[-0.025, -0.003, 0], [-0.025, 0.003, 0]], [[0.025, -0.003, 0], [0.025, 0.003, 0]]])
+        bar = np.array(
+            [
+                [[-0.025, 0, 0], [0.025, 0, 0]],
+                [[-0.025, -0.003, 0], [-0.025, 0.003, 0]],
+                [[0.025, -0.003, 0], [0.025, 0.003, 0]],
+            ]
+        )
         scene.add_line_segments(
             f"{root}/board/bar", bar.astype(np.float32), (82, 96, 109), thickness=2.0, thickness_units="screen",
             position=(0.0, BAR_AT, 0.0),
         )  # fmt: skip
-        scene.add_label(f"{root}/board/mm", "50 mm", position=(0.0, BAR_AT - 0.006, 0.0), anchor="top-center")
+        scene.add_label(
+            f"{root}/board/mm", "50 mm", position=(0.0, BAR_AT - 0.006, 0.0), anchor="top-center"
+        )
         self._colours = client.gui.add_html("")
         self._painted: object = None
 
@@ -215,12 +233,15 @@ class HeadNodes:
 
 def painted_html(head: Head) -> str:
     """The colours of both meshes of a head as data for the page's script."""
-    colours, coarse = shaded(head), head.coarse_faces is not None  # the first of the fine vertices are the coarse ones
+    colours, coarse = (
+        shaded(head),
+        head.coarse_faces is not None,
+    )  # the first of the fine vertices are the coarse ones
     return colour_html(f"/{head.name}/head" + (f" /{head.name}/draft" if coarse else ""), colours)
 
 
 def shaded(head: Head) -> NDArray[np.uint8]:
-    """(V, 3) sRGB: the head's colours darkened by ambient occlusion, in linear light; legend colours stay as they are."""
+    """(V, 3) sRGB: the colours darkened by ambient occlusion, in linear light; legend colours stay as they are."""
     if head.occlusion is None or not head.lit:
         return head.colours
     linear = _to_linear()[head.colours] * (head.occlusion[:, None] / 255.0) ** OCCLUSION_POWER
@@ -244,4 +265,6 @@ def quaternion(R: NDArray[np.float64]) -> NDArray[np.float64]:
             [0.0, 0.0, 0.0, R[2, 2] - R[0, 0] - R[1, 1]],
         ]
     )
-    return np.linalg.eigh(K + np.triu(K, 1).T)[1][:, -1]  # eigenvector of the largest eigenvalue (Bar-Itzhack)
+    return np.linalg.eigh(K + np.triu(K, 1).T)[1][
+        :, -1
+    ]  # eigenvector of the largest eigenvalue (Bar-Itzhack)

@@ -95,8 +95,10 @@ class Look(NamedTuple):
     view: str
 
 
-class ViewState(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
-    """Everything a person can set. `prior` is the fit's noise_percent (what it assumes), `noise` is observe's (what is)."""
+class ViewState(
+    msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True
+):
+    """Everything a person can set. `prior` is the noise the fit assumes, `noise` what observe adds."""
 
     v: int = 1
     model: str = "embedded"
@@ -121,8 +123,8 @@ class ViewState(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     def __post_init__(self) -> None:
         if self.v != 1:
             raise ValueError(f"v: {self.v!r} is a newer format than this program reads (1)")
-        if not isinstance(self.model, str) or not self.model:
-            raise ValueError(f"model: {self.model!r} is not a name or a path")
+        if not self.model:
+            raise ValueError("model: '' is not a name or a path")
         for field in FIELDS.values():
             check(field, getattr(self, field.name))
 
@@ -130,14 +132,25 @@ class ViewState(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     def target(self) -> Target:
         """The part that decides the observation."""
         return Target(
-            self.model, self.subject, self.actual, self.yaw, self.pitch, self.roll, self.scheme, self.noise, self.seed
+            self.model,
+            self.subject,
+            self.actual,
+            self.yaw,
+            self.pitch,
+            self.roll,
+            self.scheme,
+            self.noise,
+            self.seed,
         )
 
     @property
     def fitting(self) -> Fitting:
         """The part that decides the fit of an observation."""
         return Fitting(
-            None if self.camera == "orthographic" else self.distance, self.modes, self.prior, self.box
+            None if self.camera == "orthographic" else self.distance,
+            self.modes,
+            self.prior,
+            self.box,
         )
 
     @property
@@ -157,11 +170,17 @@ def check(field: Field, value: Any) -> None:
         if value not in field.choices:
             raise ValueError(f"{field.name}: {value!r} is not {' or '.join(field.choices)}")
         return
-    if not isinstance(value, field.kind | int) or isinstance(value, bool):  # every int is a float, not the other way
-        raise ValueError(f"{field.name}: {value!r} is not a {'whole number' if field.kind is int else 'number'}")
+    if not isinstance(value, field.kind | int) or isinstance(
+        value, bool
+    ):  # every int is a float, not the other way
+        raise ValueError(
+            f"{field.name}: {value!r} is not a {'whole number' if field.kind is int else 'number'}"
+        )
     if not field.low <= value <= field.high:  # False for NaN too
         unit = f" {field.unit}" if field.unit else ""
-        raise ValueError(f"{field.name}: {value:g} is not within {field.low:g} to {field.high:g}{unit}")
+        raise ValueError(
+            f"{field.name}: {value:g} is not within {field.low:g} to {field.high:g}{unit}"
+        )
 
 
 def clamp(field: Field, value: Any) -> tuple[Any, bool]:
@@ -192,7 +211,9 @@ def parse(kind_of: Field, text: str) -> Any:
     try:
         return kind_of.kind(text)
     except ValueError as error:
-        raise ValueError(f"{kind_of.name}: {text!r} is not a {'whole ' if kind_of.kind is int else ''}number") from error
+        raise ValueError(
+            f"{kind_of.name}: {text!r} is not a {'whole ' if kind_of.kind is int else ''}number"
+        ) from error
 
 
 DEFAULT = ViewState()

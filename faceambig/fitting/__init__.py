@@ -21,7 +21,9 @@ __all__ = ["Fit", "FitOptions", "Status", "fit"]
 
 NEAREST = 0.2  # metres: nearer fits put the nose of large faces behind the camera (MATH.md 1)
 FARTHEST = 1e6  # metres; beyond, ask for camera="orthographic"
-FIRST_KAPPA = 1.0  # per metre: where a free distance starts; no second basin in kappa was met (MATH.md 3)
+FIRST_KAPPA = (
+    1.0  # per metre: where a free distance starts; no second basin in kappa was met (MATH.md 3)
+)
 
 
 def fit(
@@ -62,7 +64,9 @@ def fit(
     kappa = kappa_of(camera, distance)
     task = prepare(model, observation, options)
     free = camera == "perspective" and distance is None
-    return solve_from(task, start_pose(task.problem, kappa), np.zeros(task.problem.modes.shape[2]), free)
+    return solve_from(
+        task, start_pose(task.problem, kappa), np.zeros(task.problem.modes.shape[2]), free
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,7 +82,7 @@ class Task:
 
 
 def prepare(model: FaceModel, observation: Observation, options: FitOptions) -> Task:
-    """Visible points, their rows of the model and the prior's weight in px^2; ValueError if they do not belong together."""
+    """Visible points, their rows of the model, the prior's weight in px^2; ValueError if they do not match."""
     visible = observation.visible
     vertices = observation.vertices(model)
     mean, Q = landmark_rows(model, tuple(vertices[visible].tolist()))
@@ -89,8 +93,12 @@ def prepare(model: FaceModel, observation: Observation, options: FitOptions) -> 
     interocular, meaning = _interocular(model, observation, problem)
     lam = options.prior_weight
     if lam is None:
-        lam = (options.noise_percent / 100 * interocular) ** 2  # MATH.md 3: the MAP estimate has lambda = sigma^2
-    return Task(model, observation, options, replace(problem, prior_weight=lam), interocular, meaning)
+        lam = (
+            options.noise_percent / 100 * interocular
+        ) ** 2  # MATH.md 3: the MAP estimate has lambda = sigma^2
+    return Task(
+        model, observation, options, replace(problem, prior_weight=lam), interocular, meaning
+    )
 
 
 @lru_cache(maxsize=64)
@@ -99,7 +107,9 @@ def landmark_rows(model: FaceModel, vertices: tuple[int, ...]) -> tuple[Array, A
     mean, modes = model.rows(np.array(vertices, dtype=np.intp))
     spread = np.linalg.svd(mean - mean.mean(axis=0), compute_uv=False)
     if spread[1] <= FLATTEST * spread[0]:
-        raise ValueError("points: on the model they lie on one line, no pose can be found; add a point off the line")
+        raise ValueError(
+            "points: on the model they lie on one line, no pose can be found; add a point off the line"
+        )
     return read_only(mean), read_only(modes)
 
 
@@ -115,7 +125,9 @@ def solve_from(task: Task, camera: Camera, alpha: Array, free_distance: bool = F
     """The fit of a task from a given start, at the camera's distance or with the distance free."""
     problem = replace(task.problem, free_distance=free_distance)
     options = task.options
-    solution = solve(problem, camera, alpha, tolerance=options.tolerance, max_steps=options.max_steps)
+    solution = solve(
+        problem, camera, alpha, tolerance=options.tolerance, max_steps=options.max_steps
+    )
     return _answer(task, solution)
 
 
@@ -147,10 +159,15 @@ def _interocular(model: FaceModel, observation: Observation, problem: Problem) -
             return measured, scheme.eyes_meaning
     scheme = scheme or next(iter(model.schemes.values()), None)
     if scheme is None:
-        raise ValueError("noise_percent: the model names no eyes to measure it by; give prior_weight instead")
+        raise ValueError(
+            "noise_percent: the model names no eyes to measure it by; give prior_weight instead"
+        )
     start = start_pose(problem, 0.0)
     estimated = eye_distance(project(start, model.mean[scheme.vertices]), scheme)
-    return estimated, f"{scheme.eyes_meaning}, of the mean face in the fitted pose (an eye corner is missing)"
+    return (
+        estimated,
+        f"{scheme.eyes_meaning}, of the mean face in the fitted pose (an eye corner is missing)",
+    )
 
 
 def _answer(task: Task, solution: Solution) -> Fit:

@@ -1,8 +1,8 @@
 """Least value of a quadratic in a box: min 1/2 d^T H d - g^T d, low <= d <= high, H positive definite.
 
 Block principal pivoting (Judice and Pires 1994; Kim and Park 2011): guess which variables sit on a bound, solve for the
-others by Cholesky, exchange every one that violates its sign or its bound. Blocks of exchanges may cycle, so after three
-rounds without progress one variable is exchanged at a time (Murty's least index rule), which cannot.
+others by Cholesky, exchange every one that violates its sign or its bound. Blocks of exchanges may cycle, so after
+three rounds without progress one variable is exchanged at a time (Murty's least index rule), which cannot.
 """
 
 from __future__ import annotations

@@ -16,7 +16,9 @@ from ..observation import Observation
 class Status(StrEnum):
     """How a fit ended; only CONVERGED is a result to rely on."""
 
-    CONVERGED = "converged"  # the projected gradient vanishes: no step inside the box lowers the cost
+    CONVERGED = (
+        "converged"  # the projected gradient vanishes: no step inside the box lowers the cost
+    )
     MAX_STEPS = "step limit reached"
     STALLED = "no further decrease"  # rounding stopped the descent before the gradient vanished
 
@@ -27,7 +29,9 @@ class FitOptions:
 
     modes: int = 70  # S, shape modes used; models with fewer use all they have
     box: float | None = 2.0  # |alpha_j| <= box standard deviations; None: no box
-    noise_percent: float = 1.0  # landmark sd per coordinate the prior assumes, % of the interocular distance
+    noise_percent: float = (
+        1.0  # landmark sd per coordinate the prior assumes, % of the interocular distance
+    )
     prior_weight: float | None = None  # lambda in px^2 itself, instead of noise_percent
     tolerance: float = 1e-8  # relative cost above the optimum that still counts as converged
     max_steps: int = 100

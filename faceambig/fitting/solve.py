@@ -23,7 +23,9 @@ from .boxqp import FREE, solve_box_qp
 from .result import Status
 
 POSE = 6  # d (3), t_xy (2), log s
-NEAREST_KAPPA = 10.0  # per metre: free distances stop at 10 cm, where no face is in front of its camera
+NEAREST_KAPPA = (
+    10.0  # per metre: free distances stop at 10 cm, where no face is in front of its camera
+)
 SHORT_STEP = 0.3  # below this the quadratic model is bad: damp the next step
 FIRST_DAMPING, MORE_DAMPING = 1e-5, 3.0
 LARGEST_TURN = 1.0  # radians a step; beyond, the linearised rotation says nothing
@@ -60,7 +62,9 @@ def cost(problem: Problem, camera: Camera, alpha: Array) -> float:
     if camera.kappa > 0 and (depths(camera, v) <= 0).any():
         return np.inf
     e = problem.points - project(camera, v)
-    return float(problem.weights @ np.einsum("ij,ij->i", e, e) + problem.prior_weight * (alpha @ alpha))
+    return float(
+        problem.weights @ np.einsum("ij,ij->i", e, e) + problem.prior_weight * (alpha @ alpha)
+    )
 
 
 def solve(
@@ -74,9 +78,14 @@ def solve(
     diagonal = np.arange(S)
     mu, E = 0.0, cost(problem, camera, alpha)
     if not np.isfinite(E):
-        raise ValueError("distance: a landmark lies behind the camera at the start; fit at a larger distance")
+        raise ValueError(
+            "distance: a landmark lies behind the camera at the start; fit at a larger distance"
+        )
     # A noise-free picture can be explained exactly: then E itself is rounding, and no relative test ever holds
-    rounding = float(problem.weights.sum()) * (10 * np.finfo(float).eps * float(np.abs(problem.points).max())) ** 2
+    rounding = (
+        float(problem.weights.sum())
+        * (10 * np.finfo(float).eps * float(np.abs(problem.points).max())) ** 2
+    )
     flat_weights = None if (problem.weights == 1).all() else np.sqrt(problem.weights)
     for step in range(1, max_steps + 1):
         v = problem.mean + problem.modes @ alpha
@@ -102,7 +111,7 @@ def solve(
         predicted = 2 * (g @ delta) - delta @ H @ delta
         if mu == 0 and solved and predicted <= 0.1 * tolerance * E + rounding:
             return Solution(alpha, camera, E, step, Status.CONVERGED)
-        moved = _line_search(problem, camera, alpha, delta, E, 2 * (g @ delta))
+        moved = _line_search(problem, camera, alpha, delta, E, float(2 * (g @ delta)))
         if moved is None:
             if mu > 1e3 or (mu == 0 and solved and predicted <= 1e-12 * E):
                 return Solution(alpha, camera, E, step, Status.STALLED)
@@ -121,7 +130,8 @@ def _line_search(
 ) -> tuple[Array, Camera, float, float] | None:
     """The point (alpha, camera, E, length) a fraction of `delta` away that lowers E, or None.
 
-    `slope` is -dE/dlength at 0. Lengths follow the parabola through E(0), E'(0), E(length), kept in 0.15 to 0.7 of the last.
+    `slope` is -dE/dlength at 0. Lengths follow the parabola through E(0), E'(0), E(length), kept within 0.15 to 0.7
+    of the last.
     """
     turn = float(np.linalg.norm(delta[len(alpha) : len(alpha) + 3]))
     length = min(1.0, LARGEST_TURN / turn) if turn > 0 else 1.0
@@ -143,7 +153,10 @@ def moved_camera(camera: Camera, step: Array) -> Camera:
     """`camera` after a step (d, t_xy, log s[, kappa]), (6,) or (7,)."""
     kappa = camera.kappa + step[6] if len(step) > 6 else camera.kappa
     return Camera(
-        rotation_matrix(step[:3]) @ camera.R, camera.t + step[3:5], camera.s * float(np.exp(step[5])), max(0.0, kappa)
+        rotation_matrix(step[:3]) @ camera.R,
+        camera.t + step[3:5],
+        camera.s * float(np.exp(step[5])),
+        max(0.0, kappa),
     )
 
 

@@ -27,4 +27,6 @@ def pose_from_points(points: Array, mean: Array, mean_pinv: Array, kappa: float)
 
 def _cross(a: Array, b: Array) -> Array:
     # np.cross costs 15 us for two vectors; this is called once a fit
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+    return np.array(
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    )
