@@ -198,7 +198,7 @@ def tone_of(ancestry: Array, sex: float, draw: Array) -> paint.Tone:
     )  # fmt: skip
 
 
-MEAN_TONE = paint.Tone((206, 160, 132), (188, 118, 106), (66, 50, 40), (88, 66, 44))
+MEAN_TONE = paint.Tone((206, 160, 132), (188, 118, 106), (66, 50, 40), (88, 66, 44), brow_width=0.9)
 
 
 def scheme_rows(name: str, head: Head) -> list[str]:

@@ -129,9 +129,11 @@ class Painter:
 
         flush = skin * [1.0, 0.82, 0.80]
         at = {k: self.mean[v] for k, v in self.points.items()}
-        for name, radius, amount in (("cheek", 0.018, 0.34), ("al", 0.008, 0.30), ("t", 0.02, 0.2)):
-            for side in ("left", "right"):
-                mix(tone.blood * amount * blob(self.mean, at[name, side], radius), flush)
+        for side in ("left", "right"):
+            # The landmark lies on the cheek bone; the blush sits nearer to the nose.
+            cheek = 0.6 * at["cheek", side] + 0.4 * at["ac", side]
+            mix(tone.blood * 0.36 * blob(self.mean, cheek, 0.015), flush)
+            mix(tone.blood * 0.30 * blob(self.mean, at["al", side], 0.008), flush)
         mix(tone.blood * 0.4 * blob(self.mean, at["prn", "mid"], 0.011), flush)
         mix(tone.blood * 0.25 * blob(self.mean, at["pg", "mid"], 0.014), flush)
         mix(0.42 * self.ears * tone.blood, skin * [0.99, 0.76, 0.73])
