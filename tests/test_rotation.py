@@ -29,8 +29,8 @@ def test_it_is_a_rotation_that_keeps_its_axis(r):
 
 @given(rotation_vectors())
 def test_it_equals_the_power_series(r):
-    # 60 terms in longdouble are exact to 1e-18 up to |r| = pi
-    assert np.abs(rotation_matrix(r) - rotation_series(r).astype(float)).max() < 1e-15
+    # 60 terms in longdouble are exact to 1e-18 up to |r| = pi; near pi b W^2 is 1 - cos = 2: some roundings of 2
+    assert np.abs(rotation_matrix(r) - rotation_series(r).astype(float)).max() < 3e-15
 
 
 @given(rotation_vectors())

@@ -28,6 +28,7 @@ NEAREST_KAPPA = (
 )
 SHORT_STEP = 0.3  # below this the quadratic model is bad: damp the next step
 FIRST_DAMPING, MORE_DAMPING = 1e-5, 3.0
+POOR = 0.5  # share of the predicted decrease below which a shorter step is tried too
 LARGEST_TURN = 1.0  # radians a step; beyond, the linearised rotation says nothing
 QP_ROUNDS_EARLY = (2, 3, 4)  # far from the optimum the active set need not be exact
 
@@ -136,17 +137,33 @@ def _line_search(
     turn = float(np.linalg.norm(delta[len(alpha) : len(alpha) + 3]))
     length = min(1.0, LARGEST_TURN / turn) if turn > 0 else 1.0
     for _ in range(30):
-        alpha_new = np.clip(alpha + length * delta[: len(alpha)], -problem.box, problem.box)
-        camera_new = moved_camera(camera, length * delta[len(alpha) :])
-        E_new = cost(problem, camera_new, alpha_new)
+        alpha_new, camera_new, E_new = _at(problem, camera, alpha, delta, length)
         if E_new <= E - 1e-4 * length * slope:
+            if E - E_new < POOR * 0.5 * length * slope:
+                # Residuals too large for Gauss-Newton: whole steps would zig-zag across the valley for ever
+                shorter = _parabola(E, slope, E_new, length)
+                other = _at(problem, camera, alpha, delta, shorter)
+                if other[2] < E_new:
+                    return *other, length
             return alpha_new, camera_new, E_new, length
-        factor = 0.15
-        if np.isfinite(E_new):
-            curve = E_new - E + slope * length
-            factor = min(0.7, max(0.15, 0.5 * slope * length / curve)) if curve > 0 else 0.7
-        length *= factor
+        length = _parabola(E, slope, E_new, length) if np.isfinite(E_new) else 0.15 * length
     return None
+
+
+def _at(
+    problem: Problem, camera: Camera, alpha: Array, delta: Array, length: float
+) -> tuple[Array, Camera, float]:
+    """The point a fraction of `delta` away, inside the box, and its cost."""
+    there = np.clip(alpha + length * delta[: len(alpha)], -problem.box, problem.box)
+    seen = moved_camera(camera, length * delta[len(alpha) :])
+    return there, seen, cost(problem, seen, there)
+
+
+def _parabola(E: float, slope: float, E_new: float, length: float) -> float:
+    """Where the parabola through E(0), -E'(0) = slope and E(length) is least, within 0.15 to 0.7 of `length`."""
+    curve = E_new - E + slope * length
+    factor = 0.5 * slope * length / curve if curve > 0 else 0.7
+    return length * min(0.7, max(0.15, factor))
 
 
 def moved_camera(camera: Camera, step: Array) -> Camera:
