@@ -209,6 +209,12 @@ def test_the_size_stands_behind_long_remarks(path):
     assert picture_size(written(path.with_suffix(".jpg"), long)) == (40, 30)
 
 
+def test_a_table_before_the_size_is_not_the_size(path):
+    jpeg = picture(path.with_suffix(".jpg")).read_bytes()
+    tables = b"\xff\xc4\x00\x0b" + bytes(9) + b"\xff\xcc\x00\x04\x00\x00"  # Huffman, arithmetic
+    assert picture_size(written(path.with_suffix(".jpg"), jpeg[:2] + tables + jpeg[2:])) == (40, 30)
+
+
 def test_an_extended_webp_tells_its_canvas(path):
     data = (
         b"RIFF\x00\x00\x00\x00WEBPVP8X\x0a\x00\x00\x00\x00\x00\x00\x00"
@@ -228,6 +234,7 @@ def test_an_extended_webp_tells_its_canvas(path):
         b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR" + b"\xff" * 8,  # 4 billion squared
         b"\xff\xd8\xff\xe0\x00\x00" * 3,
         b"\xff\xd8\xff\xda" + bytes(100),
+        b"\xff\xd8\xff\xda\x00\x02\xff\xc0\x00\x0b\x08\x00\x05\x00\x05\x01\x01\x11\x00",  # after the pixels
         b"RIFF\x00\x00\x00\x00WEBPVP8?" + bytes(30),
     ],
 )

@@ -135,6 +135,13 @@ def test_integers_become_metres(path):
     assert model.regions["odd"].tolist() == list(range(1, 80, 2))
 
 
+def test_arrays_stored_column_by_column_are_the_same(path, tmp_path):
+    turned = {
+        name: np.asfortranarray(arrays()[name]) for name in ("mean", "modes", "faces", "colours")
+    }
+    assert same(fio.load_model(write(path)), fio.load_model(write(tmp_path / "turned.npz", turned)))
+
+
 def test_colours_of_control_vertices_are_blended_over_the_surface(path):
     stored = arrays()["colours"].astype(float)
     colours = fio.load_model(write(path)).colours

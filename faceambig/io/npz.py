@@ -399,9 +399,8 @@ def _subjects(arrays: Mapping[str, NDArray[Any]], model: FaceModel) -> tuple[Sub
 
 
 def _schemes_beside(path: Path, model: str, n_vertices: int) -> dict[str, Scheme]:
-    if not re.fullmatch(
-        r"[\w-]{1,40}", model
-    ):  # a name from the file: it must not lead out of the folder
+    # The name comes from the file: it must not lead out of the folder
+    if not re.fullmatch(r"[\w-]{1,40}", model):
         return {}
     files = sorted((path.parent / "schemes").glob(f"{model}_*.csv"))
     names = [file.stem.removeprefix(f"{model}_") for file in files]
