@@ -55,7 +55,7 @@ for-demo:
 	@tools/system_packages.sh "$(PY)" venv gl
 
 for-test:
-	@tools/system_packages.sh "$(PY)" venv gl browser
+	@tools/system_packages.sh "$(PY)" venv gl browser node
 
 .venv/.app: pyproject.toml requirements.lock
 	@tools/system_packages.sh "$(PY)" venv

@@ -2,7 +2,7 @@
 # Finds what pip cannot bring and gets it where that is allowed: as root on Debian and Ubuntu by apt-get.
 # Elsewhere it says in one line what to type; it never calls sudo.
 #
-#   tools/system_packages.sh PYTHON [venv] [gl] [browser]
+#   tools/system_packages.sh PYTHON [venv] [gl] [browser] [node]
 #
 # Exit 1 if PYTHON cannot serve. A missing renderer or browser stops nothing here: the tests that need
 # one skip with a reason, or fail where CI=true.
@@ -30,6 +30,7 @@ has() {
         [ -n "${FACEAMBIG_CHROMIUM:-}" ] || command -v chromium || command -v chromium-browser ||
             command -v google-chrome || ls -d "$HOME"/.cache/ms-playwright/chromium-*
         ;;
+    node) loads libatomic.so.1 ;; # playwright brings its own Node, which needs this one library
     esac >/dev/null 2>&1
 }
 
@@ -52,6 +53,10 @@ find_missing() {
                 names="$names, Chromium (page tests)"
                 packages="$packages chromium"
             fi
+            ;;
+        node)
+            names="$names, libatomic (page tests)"
+            packages="$packages libatomic1"
             ;;
         esac
     done
