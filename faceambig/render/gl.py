@@ -30,7 +30,9 @@ from .painter import vertex_normals
 
 LIBRARIES = {"osmesa": ("libOSMesa.so.8",), "egl": ("libEGL.so.1", "libGL.so.1")}
 INSTALL = "sudo apt-get install libegl1 libgl1 libgl1-mesa-dri libosmesa6"
-FRAMES = 50  # of one renderer: OSMesa loses 2 to 3 MB a frame until it is deleted
+FRAMES = (
+    20  # of one OSMesa renderer: it loses 2 to 7 MB a frame and gives them back when it is deleted
+)
 EYE, NEAR, FAR = (
     20.0,
     18.0,
@@ -123,7 +125,7 @@ def render_head(
             renderer,
             points,
             normals,
-            head.faces,
+            faces,
             colours,
             head.lit,
             half,
@@ -303,7 +305,7 @@ class Studio:
             job, future = item
             try:
                 pyrender = pyrender or _import_pyrender(self.name)
-                if renderer is not None and frames >= FRAMES:
+                if renderer is not None and frames >= FRAMES and self.name == "osmesa":
                     renderer.delete()
                     renderer = None
                 if renderer is None:
