@@ -95,14 +95,8 @@ def _check_size(model: FaceModel) -> None:
         gap = _centre(model, left) - _centre(model, right)
         mm = 1000.0 * float(np.linalg.norm(gap))
         if not low <= mm <= high:
-            hint = next(
-                (
-                    f"; {mm * 10.0**k:.4g} mm in a unit 10^{k} times as large: wrong unit?"
-                    for k in range(-6, 7)
-                    if low <= mm * 10.0**k <= high
-                ),
-                "",
-            )
+            fits = next((k for k in range(-6, 7) if low <= mm * 10.0**k <= high), None)
+            hint = "" if fits is None else f"; times {10.0**fits:g} it would fit: a wrong unit?"
             raise AssetError(
                 f"{model.name}: {what} of the mean are {mm:.4g} mm apart, an adult's {low:g} to {high:g}{hint}"
             )
