@@ -231,7 +231,7 @@ def seen(page: Page, colour: tuple[int, int, int]) -> bool:
 
 def paint(server: Tiny, colour: tuple[int, int, int], count: int = SIDE * SIDE) -> None:
     server.made["colours"].content = guard.colour_html(
-        "/patch", np.tile(np.uint8(colour), (count, 1))
+        "/patch", np.tile(np.array(colour, np.uint8), (count, 1))
     )
 
 
@@ -256,7 +256,7 @@ def test_vertex_colours_stay_whatever_happens_to_the_mesh(server: Tiny, page: Pa
     )
     vertices, _ = patch()
     for k in range(40):  # two seconds of a drag
-        mesh.vertices = vertices + np.float32([0, 0, 0.001 * (k % 5)])
+        mesh.vertices = vertices + np.array([0, 0, 0.001 * (k % 5)], np.float32)
         server.client.flush()
         time.sleep(0.05)
     assert page.evaluate("[window.pictures > 5, window.wrong]") == [True, 0]

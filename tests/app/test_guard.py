@@ -1,0 +1,562 @@
+"""The guard over a real socket: bad things first, then a good browser is still served."""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import gzip
+import http.client
+import logging
+import math
+import socket
+import struct
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+import viser
+import zstandard
+from viser import _viser
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Subprotocol
+
+from faceambig_app import guard
+
+SOON = 5.0  # seconds: other tests share the processors
+CAMERA = {
+    "type": "ViewerCameraMessage",
+    "wxyz": (1.0, 0.0, 0.0, 0.0),
+    "position": (0.0, 0.0, 3.0),
+    "fov": 1.0,
+    "near": 0.01,
+    "far": 100.0,
+    "image_height": 600,
+    "image_width": 800,
+    "look_at": (0.0, 0.0, 0.0),
+    "up_direction": (0.0, 0.0, 1.0),
+}
+
+
+def until(holds: Callable[[], Any], seconds: float = SOON) -> Any:
+    """The first true value of `holds`, or its last one."""
+    end = time.monotonic() + seconds
+    while not (value := holds()) and time.monotonic() < end:
+        time.sleep(0.01)
+    return value
+
+
+class Browser:
+    """Speaks viser's protocol as the page does, without drawing."""
+
+    def __init__(self, port: int, camera: bool = True, **options: Any) -> None:
+        options = {
+            "compression": None,
+            "origin": f"http://127.0.0.1:{port}",
+            "proxy": None,
+        } | options
+        self.socket: ClientConnection = connect(
+            f"ws://127.0.0.1:{port}/",
+            subprotocols=[Subprotocol("viser-v1.1.1")],
+            max_size=None,
+            **options,
+        )
+        self.values: dict[str, Any] = {}  # of controls, as this browser would show them
+        if camera:
+            self.send(CAMERA)
+
+    def send(self, message: object) -> None:
+        self.socket.send(message if isinstance(message, bytes) else msgspec.msgpack.encode(message))
+
+    def set(self, control: Any, value: object) -> None:
+        self.values[control._impl.uuid] = value
+        self.update(control, value=value)
+
+    def update(self, control: Any, **updates: object) -> None:
+        self.send({"type": "GuiUpdateMessage", "uuid": control._impl.uuid, "updates": updates})
+
+    def read(self, seconds: float = 0.05) -> None:
+        """Takes in what has come, until nothing comes for some time."""
+        while True:
+            try:
+                frame = self.socket.recv(timeout=seconds)
+            except TimeoutError:
+                return
+            assert isinstance(frame, bytes)
+            size, packed = struct.unpack_from("<QQ", frame)
+            content = zstandard.ZstdDecompressor().decompress(frame[16 : 16 + packed], size)
+            for message in msgspec.msgpack.decode(content)["messages"]:
+                if message["type"] == "GuiUpdateMessage" and "value" in message["updates"]:
+                    self.values[message["uuid"]] = message["updates"]["value"]
+
+    def shows(self, control: Any) -> Any:
+        self.read()
+        return self.values.get(control._impl.uuid)
+
+    def __enter__(self) -> Browser:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.socket.close()
+
+
+@dataclass
+class Tiny:
+    server: viser.ViserServer
+    refused: list[tuple[int, str]] = field(default_factory=list)
+    errors: list[tuple[int | None, str]] = field(default_factory=list)
+    clients: dict[int, dict[str, Any]] = field(default_factory=dict)
+
+    @property
+    def port(self) -> int:
+        return self.server.get_port()
+
+    @property
+    def netloc(self) -> str:
+        return f"127.0.0.1:{self.port}"
+
+    def get(self, target: str = "/", **headers: str) -> tuple[http.client.HTTPResponse, bytes]:
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=SOON)
+        connection.putrequest("GET", target, skip_host="Host" in headers, skip_accept_encoding=True)
+        for name, value in headers.items():
+            connection.putheader(name.replace("_", "-"), value)
+        connection.endheaders()
+        with contextlib.closing(connection):
+            answer = connection.getresponse()
+            return answer, answer.read()
+
+    @contextlib.contextmanager
+    def browser(self, **options: Any) -> Iterator[tuple[Browser, dict[str, Any]]]:
+        """A browser and the controls that it has got."""
+        known = set(self.clients)
+        with Browser(self.port, **options) as browser:
+            new = until(lambda: set(self.clients) - known)
+            yield browser, self.clients[min(new)]
+
+
+def made(gui: viser.GuiApi) -> dict[str, Any]:
+    return {
+        "slider": gui.add_slider("Distance", 20.0, 300.0, 0.5, 120.0),
+        "steps": gui.add_slider("Steps", 0, 96, 1, 50),
+        "number": gui.add_number("Typed", 120.0, min=20.0, max=300.0),
+        "on": gui.add_checkbox("On", True),
+        "text": gui.add_text("Name", "Anna"),
+        "view": gui.add_dropdown("View", ("front", "side"), initial_value="front"),
+        "show": gui.add_button_group("Show", ("both", "one")),
+        "press": gui.add_button("Press"),
+        "size": gui.add_vector3("Size", (1.0, 2.0, 3.0), min=(0.0, 0.0, 0.0), max=(9.0, 9.0, 9.0)),
+        "tint": gui.add_rgb("Tint", (1, 2, 3)),
+        "range": gui.add_multi_slider("Range", 0.0, 1.0, 0.1, (0.2, 0.8)),
+        "upload": gui.add_upload_button("Photo"),
+        "off": gui.add_slider("Disabled", 0, 9, 1, 5, disabled=True),
+        "gone": gui.add_slider("Hidden", 0, 9, 1, 5, visible=False),
+    }
+
+
+@pytest.fixture(scope="module")
+def tiny() -> Iterator[Tiny]:
+    page = Tiny(
+        guard.start(
+            port=0,
+            keys=("distance", "view"),
+            hooks=guard.Hooks(
+                words=lambda control, asked, put: f"{control.label}: {asked!r}, set to {put!r}",
+                on_refused=lambda client, words: page.refused.append((client, words)),
+                on_error=lambda client, error: page.errors.append((client, str(error))),
+            ),
+        )
+    )
+
+    async def enter(client: viser.ClientHandle) -> None:
+        controls = made(client.gui)
+
+        async def breaks(_event: object) -> None:
+            raise ValueError("in the loop")
+
+        def breaks_in_a_thread(_event: object) -> None:
+            raise ValueError("in a thread")
+
+        controls["press"].on_click(breaks)
+        controls["view"].on_update(breaks_in_a_thread)
+        page.clients[client.client_id] = controls | {"client": client}
+
+    page.server.on_client_connect(enter)
+    yield page
+    page.server.stop()
+
+
+@pytest.fixture(autouse=True)
+def forget(tiny: Tiny) -> None:
+    tiny.refused.clear()
+    tiny.errors.clear()
+
+
+# ---------------------------------------------------------------- starting
+
+
+@pytest.mark.parametrize(
+    ("host", "port", "words"),
+    [
+        ("nosuch.invalid", 0, "host 'nosuch.invalid'"),
+        ("0.0.0.0", 0, "this machine only"),
+        ("192.0.2.1", 0, "this machine only"),
+        ("::", 0, "this machine only"),
+        ("127.0.0.1", 70000, "port 70000"),
+        ("127.0.0.1", -1, "port -1"),
+    ],
+)
+def test_a_place_that_cannot_be_is_refused_in_a_line(host: str, port: int, words: str) -> None:
+    with pytest.raises(guard.ServeError, match=words) as caught:
+        guard.start(host, port)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_taken_port_is_refused(tiny: Tiny) -> None:
+    with pytest.raises(guard.ServeError, match=f"port {tiny.port} is taken"):
+        guard.start(port=tiny.port)
+
+
+def test_another_viser_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(viser, "__version__", "1.1.2")
+    with pytest.raises(guard.ServeError, match=r"viser 1\.1\.2: the page needs 1\.1\.1"):
+        guard.start(port=0)
+
+
+def test_a_bundle_that_is_not_as_expected_is_refused() -> None:
+    with pytest.raises(guard.ServeError, match="its script is not as expected"):
+        guard.start(port=0, patches=[("function RL(", "")] * 2)
+
+
+def test_nothing_is_printed_by_viser(capfd: pytest.CaptureFixture[str]) -> None:
+    guard.start(port=0).stop()
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have one loopback address")
+def test_this_machine_only(tiny: Tiny) -> None:
+    with socket.socket() as other:  # an address that is ours only if nobody listens on all of them
+        other.bind(("127.0.0.2", tiny.port))
+
+
+# ---------------------------------------------------------------- requests
+
+
+def test_the_page(tiny: Tiny) -> None:
+    for target in ("/", "/index.html", "/?distance=1.2&darkMode=1"):
+        answer, plain = tiny.get(target)
+        assert answer.status == 200
+    _, packed = tiny.get(Accept_Encoding="gzip, br")
+    assert gzip.decompress(packed) == plain
+    assert plain.index(b"data-faceambig") < plain.index(b"data-p=")  # our script is before viser's
+    assert b"<title>faceambig</title>" in plain
+
+
+HOSTILE_PATHS = (
+    "//", "//index.html", "/%69ndex.html", "/./index.html", "/..", "/../../etc/passwd", "/%2e%2e/x",
+    "/C:/Windows/win.ini", "/%5c%5chost%5cshare", "/x%00.js", "/index.html::$DATA", "/NUL", "/" + "a" * 5000,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("path", HOSTILE_PATHS, ids=lambda path: path[:24])
+def test_there_is_no_other_file(tiny: Tiny, path: str) -> None:
+    assert tiny.get(path)[0].status == 404
+
+
+@pytest.mark.parametrize(
+    "host", ["", "evil.example", "127.0.0.1", "127.0.0.1:1", "localhost.evil.example:{}", "evil:{}"]
+)
+def test_a_foreign_host_is_refused(tiny: Tiny, host: str) -> None:
+    host = host.format(tiny.port)
+    assert tiny.get(Host=host)[0].status == 421
+    with pytest.raises(InvalidStatus, match="421"):
+        Browser(tiny.port, additional_headers={"Host": host}, origin=None)
+
+
+def test_own_hosts_are_served(tiny: Tiny) -> None:
+    for host in (tiny.netloc, f"localhost:{tiny.port}", f"LOCALHOST:{tiny.port}"):
+        assert tiny.get(Host=host)[0].status == 200
+
+
+@pytest.mark.parametrize(
+    "origin",
+    [
+        "null",
+        "http://evil.example",
+        "https://{}",
+        "http://{}.evil.example",
+        "http://127.0.0.1:1",
+        "file://",
+    ],
+)
+def test_a_foreign_origin_is_refused(tiny: Tiny, origin: str) -> None:
+    with pytest.raises(InvalidStatus, match="403"):
+        Browser(tiny.port, origin=origin.format(tiny.netloc))
+
+
+@pytest.mark.parametrize(
+    ("query", "left"),
+    [
+        ("websocket=ws://evil.example:1/", ""),
+        ("playbackPath=//evil.example/a.viser&distance=1.2", "?distance=1.2"),
+        ("web%73ocket=x&view=top&view=%66", "?view=top&view=%66"),
+        ("WEBSOCKET=x", ""),
+        ("distance&&view=1", "?distance&view=1"),
+        ("next=//evil.example", ""),
+    ],
+)
+def test_the_address_keeps_our_words_only(tiny: Tiny, query: str, left: str) -> None:
+    answer, _ = tiny.get(f"/?{query}")
+    assert (answer.status, answer.headers["Location"]) == (303, f"/{left}")
+
+
+def test_every_answer_is_dressed(tiny: Tiny) -> None:
+    answers = [tiny.get()[0], tiny.get("/x")[0], tiny.get("/?x=1")[0], tiny.get(Host="x")[0]]
+    answers.append(tiny.get(Upgrade="websocket", Origin="http://evil.example")[0])
+    answers.append(tiny.get(Upgrade="websocket")[0])  # this one is answered by websockets itself
+    assert [answer.status for answer in answers] == [200, 404, 303, 421, 403, 426]
+    for answer in answers:
+        policy = answer.headers["Content-Security-Policy"]
+        assert "'unsafe-eval'" not in policy
+        assert f"connect-src 'self' ws://{tiny.netloc} " in policy
+        assert policy.count("'sha256-") == 3
+        assert answer.headers["X-Content-Type-Options"] == "nosniff"
+        assert answer.headers["X-Frame-Options"] == "DENY"
+        assert answer.headers["Referrer-Policy"] == "no-referrer"
+        assert answer.headers["Cache-Control"] == "no-store"
+        assert "Server" not in answer.headers
+
+
+def test_compression_is_never_agreed(tiny: Tiny) -> None:
+    with Browser(tiny.port, compression="deflate") as browser:
+        assert browser.socket.protocol.extensions == []
+
+
+# ---------------------------------------------------------------- messages
+
+GARBAGE = (
+    b"", b"\xc1", b"\x80", b"\xff" * 99, b"\x91" * 5000, msgspec.msgpack.encode([1]), {"type": 3},
+    {"type": "Message"}, {"type": "NoSuch"}, {"type": "ShareUrlRequest"}, {"type": "ShareUrlDisconnect"},
+    {"type": "RunJavascriptMessage", "source": "1"}, {"type": "GuiUpdateMessage", "uuid": 1, "updates": {}},
+    {"type": "GuiUpdateMessage", "uuid": "x", "updates": []},
+    {"type": "GuiUpdateMessage", "uuid": "x", "updates": {}, "y": 1},
+    CAMERA | {"fov": math.nan}, CAMERA | {"position": (0.0, math.inf, 0.0)}, CAMERA | {"wxyz": (1.0,)},
+    CAMERA | {"image_height": 10**12}, CAMERA | {"up_direction": "up"}, {"type": "ViewerCameraMessage"},
+)  # fmt: skip
+
+
+def test_garbage_is_dropped_and_hurts_nobody(
+    tiny: Tiny, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with tiny.browser() as (browser, controls):
+        for message in GARBAGE:
+            browser.send(message)
+        browser.send(CAMERA | {"image_height": 0})  # a canvas that is folded away
+        browser.set(controls["steps"], 7)
+        assert until(lambda: controls["steps"].value == 7)
+        assert controls["client"].camera.aspect > 0
+        assert len(caplog.records) == 1
+        assert "\n" not in caplog.text.strip()
+        for _ in range(guard.MAX_BAD):
+            browser.send(b"\xc1")
+        with pytest.raises(ConnectionClosed, match="1008"):
+            browser.read(SOON)
+    assert not tiny.errors
+
+
+def test_a_message_too_large_ends_its_own_connection(tiny: Tiny) -> None:
+    with tiny.browser() as (browser, _):
+        browser.send(bytes(guard.MAX_MESSAGE + 1))
+        with pytest.raises(ConnectionClosed, match="1009"):
+            browser.read(SOON)
+
+
+def test_there_is_no_tunnel(tiny: Tiny) -> None:
+    with pytest.raises(guard.ServeError, match="not published"):
+        vars(_viser)["ViserTunnel"]("share.example", 80)
+    with tiny.browser() as (browser, _):
+        browser.send({"type": "ShareUrlRequest"})
+        browser.read(0.2)
+        assert tiny.server._share_tunnel is None
+
+
+# ---------------------------------------------------------------- values
+
+ALLOWED = (
+    ("slider", 20.5), ("slider", 300), ("steps", 96), ("steps", 12.0), ("number", 33.3), ("on", False),
+    ("text", "Ünal\n2"), ("text", ""), ("view", "side"), ("show", "one"), ("size", [0, 9, 4.5]),
+    ("tint", [0, 255, 7]), ("range", [0.3, 0.4]),
+)  # fmt: skip
+OF_NO_KIND = (
+    ("slider", math.nan), ("slider", math.inf), ("slider", "30"), ("slider", None), ("slider", True), ("slider", [30]),
+    ("slider", {}), ("steps", -math.inf), ("number", math.nan), ("on", "false"), ("on", 0), ("on", None), ("text", 5),
+    ("text", "a" * 10_001), ("text", "a\x00"), ("text", "\x1b[2J"), ("view", "top"), ("view", 0), ("view", ["front"]),
+    ("show", "none"), ("size", [1, 2]), ("size", [1, 2, math.nan]), ("size", [1, 2, 99]), ("size", "abc"), ("size", 3),
+    ("tint", [0, 0, 256]), ("tint", [0.5, 0, 0]), ("tint", [-1, 0, 0]), ("range", [0.8, 0.2]), ("range", [0.5]),
+    ("range", [0.1, 1.2]), ("upload", "x"), ("upload", {"name": "x", "content": b""}), ("off", 7), ("gone", 7),
+)  # fmt: skip
+
+
+def test_right_values_are_taken(tiny: Tiny) -> None:
+    with tiny.browser() as (browser, controls):
+        for name, value in ALLOWED:
+            browser.set(controls[name], value)
+            put = tuple(value) if isinstance(value, list) else value
+            assert until(lambda name=name, put=put: controls[name].value == put), (name, value)
+            assert type(controls["steps"].value) is int
+    assert not tiny.refused
+
+
+def test_values_of_no_kind_are_put_back(tiny: Tiny) -> None:
+    with tiny.browser() as (browser, controls):
+        before = {name: controls[name].value for name, _ in OF_NO_KIND}
+        for name, value in OF_NO_KIND:
+            browser.set(controls[name], value)
+            browser.read(0.02)
+        browser.set(controls["steps"], 9)
+        assert until(lambda: controls["steps"].value == 9)
+        for name in before.keys() - {"steps"}:
+            value = before[name]
+            assert controls[name].value == value
+            if name not in ("upload", "show"):  # these show no value
+                right = list(value) if isinstance(value, tuple) else value
+                assert browser.shows(controls[name]) == right, name
+        said = len(OF_NO_KIND) - 2  # of a disabled or hidden one nothing is said
+        assert len(tiny.refused) == said
+    assert not tiny.errors
+
+
+def test_only_the_value_can_be_set(tiny: Tiny) -> None:
+    with tiny.browser() as (browser, controls):
+        slider = controls["slider"]
+        for name in (
+            "removed",
+            "update_cb",
+            "sync_cb",
+            "gui_api",
+            "is_button",
+            "props",
+            "__dict__",
+            "uuid",
+        ):
+            browser.update(slider, **{name: True})
+            browser.update(slider, **{name: True, "value": 40.0})
+        browser.set(slider, 50.0)
+        assert until(lambda: slider.value == 50.0)
+
+
+def test_a_number_out_of_range_waits_for_the_end_of_typing(tiny: Tiny) -> None:
+    with tiny.browser() as (browser, controls):
+        typed = controls["number"]
+        for value in (1, 12, 125):
+            browser.set(typed, value)
+            time.sleep(0.05)
+            assert typed.value in (120, 125)
+        assert until(lambda: typed.value == 125)
+        time.sleep(guard.TYPING + 0.1)
+        assert not tiny.refused
+        browser.set(typed, 5)
+        assert until(lambda: tiny.refused)
+        assert tiny.refused[0] == (controls["client"].client_id, "Typed: 5, set to 20.0")
+        assert typed.value == browser.shows(typed) == 20.0
+        browser.set(typed, 999)
+        browser.set(typed, 300)  # the browser puts the nearest value itself when the field is left
+        assert until(lambda: len(tiny.refused) == 2, 0.5)
+        assert typed.value == 300.0
+
+
+def test_a_shared_control_is_checked_too(tiny: Tiny) -> None:
+    shared = tiny.server.gui.add_slider("Shared", 0, 10, 1, 5)
+    try:
+        with tiny.browser() as (browser, _), tiny.browser() as (witness, _):
+            browser.set(shared, math.nan)
+            browser.set(shared, 70)
+            assert until(lambda: shared.value == 10)
+            assert until(lambda: witness.shows(shared) == 10)
+            assert browser.shows(shared) == 10
+    finally:
+        shared.remove()
+
+
+# ---------------------------------------------------------------- errors
+
+
+def test_errors_of_handlers_are_told_and_logged_in_a_line(
+    tiny: Tiny, caplog: pytest.LogCaptureFixture
+) -> None:
+    with tiny.browser() as (browser, controls):
+        me = controls["client"].client_id
+        browser.update(controls["press"], value=True)
+        assert until(lambda: tiny.errors == [(me, "in the loop")])
+        browser.update(controls["view"], value="side")
+        assert until(lambda: (me, "in a thread") in tiny.errors)
+        assert [r.getMessage() for r in caplog.records] == [
+            "page: ValueError: in the loop",
+            "page: ValueError: in a thread",
+        ]
+        browser.set(controls["steps"], 3)
+        assert until(lambda: controls["steps"].value == 3)
+
+
+def test_the_log_is_one_line_whatever_is_in_it(caplog: pytest.LogCaptureFixture) -> None:
+    guard._say("a\nb\x1b[31m" + "c" * 999)
+    assert caplog.messages[0].startswith("page: a\\nb\\x1b[31mccc")
+    assert len(caplog.messages[0]) < 260
+
+
+# ---------------------------------------------------------------- data for the script
+
+
+def test_data_are_escaped() -> None:
+    text = guard.data_html("title", '"><script>x</script>')
+    assert "<script>" not in text
+    assert text.count('"') == 4
+    assert guard.colour_html("/a", np.array([[0, 1, 2]], np.uint8)).endswith(
+        'data-node="/a" data-rgb="AAEC"></div>'
+    )
+    assert guard.colour_html("/a /b", None).endswith('data-rgb=""></div>')
+
+
+@pytest.mark.parametrize(
+    "colours", [np.zeros((2, 3)), np.zeros((2, 4), np.uint8), np.zeros(3, np.uint8)]
+)
+def test_colours_are_checked(colours: np.ndarray) -> None:
+    with pytest.raises(ValueError, match="colours must be"):
+        guard.colour_html("/a", colours)
+
+
+# ---------------------------------------------------------------- coming and going
+
+
+@pytest.mark.slow
+def test_nothing_is_left_of_two_hundred_browsers(tiny: Tiny) -> None:
+    def visit() -> None:
+        with Browser(tiny.port) as browser:
+            browser.read(0.005)
+
+    def kept() -> tuple[int, int, int]:
+        internal = tiny.server._websock_server
+        assert until(lambda: not internal._live_connections and not tiny.server.get_clients())
+        tiny.clients.clear()
+        gc.collect()
+        return (
+            sum(isinstance(o, viser.ClientHandle) for o in gc.get_objects()),
+            len(internal._client_state_from_id),
+            len(gc.get_objects()),
+        )
+
+    for _ in range(20):
+        visit()
+    first = kept()
+    for _ in range(180):
+        visit()
+    last = kept()
+    assert last[:2] == first[:2] == (0, 0)
+    assert last[2] - first[2] < 180  # less than one object a browser
+
+
+logging.getLogger("websockets.client").setLevel(logging.ERROR)
