@@ -24,7 +24,7 @@ import socket
 import sys
 import threading
 import types
-from collections.abc import Awaitable, Callable, Collection, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Collection, Iterable, Mapping, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import partial
@@ -621,6 +621,17 @@ def _put_back(api: Any, client_id: Any, control: Any) -> None:
         message = _messages.GuiUpdateMessage(control._impl.uuid, {"value": control.value})
         client._websock_connection.queue_message(message)
         client.flush()
+
+
+def restate(client: viser.ClientHandle, controls: Iterable[Any]) -> None:
+    """Send the values of controls, those that the server has not changed too.
+
+    A value of ours that crosses an older one of the browser's on the way is shown there and is wrong here; saying it
+    once more when nobody moves ends the disagreement.
+    """
+    for control in controls:
+        message = _messages.GuiUpdateMessage(control._impl.uuid, {"value": control.value})
+        client._websock_connection.queue_message(message)
 
 
 def _typing(first: object, second: object) -> bool:

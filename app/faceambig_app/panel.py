@@ -85,6 +85,18 @@ class Panel:
             handle.value = getattr(state, name)
         self._flex.value = state.flex
 
+    @property
+    def controls(self) -> tuple[viser.GuiInputHandle[Any], ...]:
+        """All that hold a value."""
+        return (
+            self._distance,
+            self._distance_cm,
+            self._subject,
+            self._actual,
+            *self._pose.values(),
+            self._flex,
+        )
+
     def spoken(self, state: ViewState) -> str:
         """Data for the page's script: the button that is on, and what a screen reader says for a distance slider."""
         texts = {

@@ -5,10 +5,12 @@ One way: event -> state -> compute -> draw.
 
 from __future__ import annotations
 
+import asyncio
 import gc
 import logging
 import signal
 import threading
+from asyncio import AbstractEventLoop
 from types import FrameType
 from typing import Any
 
@@ -30,8 +32,10 @@ SIDE_WIDTH = 372  # pixels of each docked panel
 class Browser:
     """One connected browser: widgets, nodes and figures of its room."""
 
-    def __init__(self, client: viser.ClientHandle, dispatcher: Dispatcher) -> None:
-        self._client = client
+    def __init__(
+        self, client: viser.ClientHandle, dispatcher: Dispatcher, loop: AbstractEventLoop
+    ) -> None:
+        self._client, self._loop = client, loop
         self.room = Room(DEFAULT, self, dispatcher.ring)
         self._curves_of: object = None  # what the plots show
         self._picture_of: object = None  # what the photograph shows: (target, draft)
@@ -115,11 +119,21 @@ class Browser:
             self._picture_of = (state.target, draft)
         if not draft:
             html += self._at_rest(state, shown)
+        if self.room.left:  # while this was computed
+            return
         with self._client.atomic():
             self.stage.show(shown.scene, draft)
             for handle, content in html:
                 handle.content = content
         self._client.flush()
+        if not draft:
+            self._loop.call_soon_threadsafe(self._settle)
+
+    def _settle(self) -> None:
+        """At rest, on the loop: what the controls show is what is, even where messages crossed on the way."""
+        if not self.room.left:
+            self.panel.show(self.room.state)
+            guard.restate(self._client, self.panel.controls)
 
     def _at_rest(self, state: ViewState, shown: Frame) -> list[tuple[viser.GuiHtmlHandle, str]]:
         numbers = shown.scene.numbers
@@ -155,7 +169,7 @@ class Page:
     async def _enter(
         self, client: viser.ClientHandle
     ) -> None:  # async: on the loop, before any message of this client
-        browser = Browser(client, self._dispatcher)
+        browser = Browser(client, self._dispatcher, asyncio.get_running_loop())
         self._browsers[client.client_id] = browser
         browser.open()
 

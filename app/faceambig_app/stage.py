@@ -208,13 +208,12 @@ class HeadNodes:
         """Send what changed of the head at `points` (V, 3), metres; equal arrays send nothing."""
         draft = draft and self._coarse is not None
         vertices = points.astype(np.float32)
-        if draft and self._coarse is not None:
-            self._coarse.vertices = vertices[: self._n_coarse]
-        else:
+        if not draft:
             self._full.vertices = vertices
-        self._full.visible = not draft
-        if self._coarse is not None:
+        if self._coarse is not None:  # at rest too: an invisible mesh must not keep an older face
+            self._coarse.vertices = vertices[: self._n_coarse]
             self._coarse.visible = draft
+        self._full.visible = not draft
         if head.colours is not self._painted:
             self._painted = head.colours
             self._colours.content = painted_html(head)
