@@ -25,10 +25,10 @@ END_TOLERANCE = 0.01  # relative, how exactly the ends of an interval are found
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """All distances with d_L below a tolerance. Metres; None: open at that side of the swept range."""
+    """All distances with d_L below a tolerance, metres."""
 
-    low: float | None
-    high: float | None
+    low: float | None  # None: open, the nearest distance of the sweep is inside
+    high: float | None  # None: open at infinity
     empty: bool  # no distance reaches the tolerance
     best_d_l_percent: float
     tolerance_percent: float
@@ -61,10 +61,13 @@ class Sweep:
         least = min(float(d_l[best]), self.orthographic.d_l_percent)
         if least > tolerance_percent:
             return Interval(None, None, True, least, tolerance_percent)
-        if d_l[best] > tolerance_percent:  # only the far-away camera reaches it
-            return Interval(float(self.distances[-1]), None, False, least, tolerance_percent)
+        if d_l[best] > tolerance_percent:  # only farther cameras than the sweep's reach it
+            low = _end_beyond(self.fits[-1], tolerance_percent) or FARTHEST
+            return Interval(low, None, False, least, tolerance_percent)
         low = self._end(range(best, -1, -1), tolerance_percent)
         high = self._end(range(best, len(self.fits)), tolerance_percent)
+        if high is None and self.orthographic.d_l_percent > tolerance_percent:
+            high = _end_beyond(self.fits[-1], tolerance_percent)
         return Interval(low, high, False, least, tolerance_percent)
 
     def _end(self, order: range, tolerance_percent: float) -> float | None:
@@ -132,6 +135,19 @@ def _crossing(inside: Fit, outside: Fit, tolerance_percent: float) -> float:
         else:
             a, near = middle, fit
     return a
+
+
+def _end_beyond(fit: Fit, tolerance_percent: float) -> float | None:
+    """Where d_L crosses the tolerance farther away than `fit`, by doubling the distance; None: nowhere."""
+    task = prepare(fit.model, fit.observation, fit.options)
+    within = fit.d_l_percent <= tolerance_percent
+    while FARTHEST * fit.camera.kappa >= 2.0:
+        farther = solve_from(task, replace(fit.camera, kappa=0.5 * fit.camera.kappa), fit.alpha)
+        if (farther.d_l_percent <= tolerance_percent) != within:
+            inside, outside = (fit, farther) if within else (farther, fit)
+            return _crossing(inside, outside, tolerance_percent)
+        fit = farther
+    return None
 
 
 __all__: Sequence[str] = ["Interval", "Sweep", "sweep_distance"]
