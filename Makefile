@@ -27,7 +27,7 @@ test: for-test .venv/.dev
 check: .venv/.dev
 	.venv/bin/ruff check
 	.venv/bin/ruff format --check
-	.venv/bin/lint-imports --no-logo
+	.venv/bin/lint-imports --no-logo --no-cache
 	.venv/bin/pyright
 
 fix: .venv/.dev
@@ -49,7 +49,7 @@ head: .venv/.dev
 	.venv/bin/python tools/build_head.py
 
 clean:
-	rm -rf .venv build dist .coverage .hypothesis .pytest_cache .ruff_cache .import_linter_cache
+	rm -rf .venv build dist .coverage .hypothesis .pytest_cache .ruff_cache
 
 for-demo:
 	@tools/system_packages.sh "$(PY)" venv gl
