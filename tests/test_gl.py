@@ -138,7 +138,7 @@ def test_an_unlit_head_is_shaded_only_where_it_turns_away():
         "",
         egg.vertices,
         egg.faces,
-        np.tile(np.uint8(colour), (len(egg.vertices), 1)),
+        np.tile(np.array(colour, dtype=np.uint8), (len(egg.vertices), 1)),
         lit=False,
     )
     picture = gl.render_head(egg, scenes.FRONT, 200, 260, 1000.0, middle=(0.0, -0.01)).astype(int)

@@ -1,6 +1,7 @@
 """Canvas: words, lines, marks and pictures on pixels, placed in units.
 
-Strokes are drawn four times as large and averaged: they keep their width, also a fraction of a pixel.
+Words and strokes are drawn four times as large and averaged: they keep their size and their width, also a fraction of
+a pixel, and the letters of small words keep their distance.
 """
 
 from __future__ import annotations
@@ -59,8 +60,14 @@ class Canvas:
         wide = self.wide(text, size, weight)
         left = x - {"start": 0.0, "middle": 0.5, "end": 1.0}[anchor] * wide
         if text:
-            org = (round(left * self.unit), round(y * self.unit))
-            cv2.putText(self.pixels, text, org, colour, self._font, self._size(size), weight)
+            start = np.array([[left, y]]) * self.unit
+            box = start + np.array([[0.0, -size], [wide, 0.4 * size]]) * self.unit
+
+            def letters(mask: Picture, place: Place) -> None:
+                org = (place(start)[0] + 8) // 16
+                cv2.putText(mask, text, org.tolist(), 255, self._font, self._size(size), weight)
+
+            self.ink(colour, box, self.unit, letters)
             self.boxes.append((text, left, y - 0.8 * size, wide, size))
         return left if anchor == "end" else left + wide
 
@@ -91,10 +98,10 @@ class Canvas:
         """Width of words in units."""
         text = text.replace("\u202f", THIN)
         box = cv2.getTextSize((0, 0), text, (0, 0), self._font, self._size(size), weight)
-        return box[2] / self.unit
+        return box[2] / (FINE * self.unit)
 
     def _size(self, size: float) -> int:
-        return max(1, round(size * self.unit))
+        return max(1, round(FINE * size * self.unit))
 
     # ---- areas ----
 

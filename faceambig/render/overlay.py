@@ -26,7 +26,7 @@ TONES: Mapping[str, Colour] = {"dim": DIM, "d_l": D_L, "d_s": D_S}
 
 USUAL, STRIP = (1440, 900), (1600, 760)  # default sizes, and the least room of a layout
 SMALLEST, LARGEST = 160, 16384  # pixels of a side
-MARGIN, COLUMN, CARD_HEIGHT = 20, 332, 114  # units; a column is what stands beside the heads
+MARGIN, COLUMN, CARD_HEIGHT = 18, 338, 122  # units; a column is what stands beside the heads
 HEAD_WIDTH = 0.228  # metres across most heads, seen from any side: the room each is given
 ROW_HEIGHT = 1.72  # times a view's half height: the room a head is given from top to bottom
 
@@ -39,10 +39,10 @@ WORDS: Mapping[str, str] = {
     "far": "assumed far away (orthographic)",
     "far_tick": "far",
     "d_l": "Landmark error",
-    "d_l_note": "of the eye distance. A person clicks within {tolerance}\u202f%.",
+    "d_l_note": "of the eye distance; people click within {tolerance}\u202f%.",
     "d_l_note_alone": "of the eye distance",
     "d_s": "Surface difference",
-    "d_s_note": "mean distance to the true face, rigidly aligned",
+    "d_s_note": "mean distance to the true face",
     "d_l_axis": "Landmark error in %",
     "d_s_axis": "Surface difference in mm",
     "axis": "assumed camera distance in cm",
@@ -149,7 +149,7 @@ def _usual(sheet: Sheet) -> None:
     canvas.text(MARGIN, y - 14, sheet.words["photo"], 15, INK, 650)
     canvas.text(MARGIN + COLUMN, y - 14, scene.photo.caption, 13.5, DIM, anchor="end")
     _photo(sheet, MARGIN, y, COLUMN)
-    _key(sheet, MARGIN, y + tall + 24)
+    _key(sheet, MARGIN, y + tall + 24, COLUMN)
     _heads(sheet, panel, width - 2 * panel)
     x = width - panel + MARGIN
     warning = _warning(sheet)
@@ -241,7 +241,7 @@ def _through_camera(sheet: Sheet) -> None:
     _photo(sheet, left, top, side)
     _photo(sheet, left + side + gap, top, side, fit=scene.photo.fit_vertices is not None)
     below = top + tall
-    _key(sheet, left, below + 34)
+    _key(sheet, left, below + 34, side)
     canvas.paragraph(left, below + 62, scene.note, 12.5, DIM, most=side, step=18)
     warning = _warning(sheet)
     if warning:
@@ -341,14 +341,14 @@ def marks(canvas: Canvas, at: Array, step: float, photo: Photo, radius: float) -
         canvas.ink(colour, everything, pad, paint)
 
 
-def _key(sheet: Sheet, x: float, y: float) -> None:
+def _key(sheet: Sheet, x: float, y: float, width: float) -> None:
     """Which mark is which, in one line."""
     canvas = sheet.canvas
     for a, b in ((-9, -1), (-1, -9)):
         canvas.line((x + 1, y + a), (x + 9, y + b), OBSERVED, 1.8)
-    end = canvas.text(x + 16, y, sheet.words["cross"], 13, DIM)
-    canvas.circle((end + 20, y - 5), 4.6, PROJECTED, 1.7)
-    canvas.text(end + 31, y, sheet.words["circle"], 13, DIM)
+    end = canvas.text(x + 15, y, sheet.words["cross"], 12.5, DIM, most=0.42 * width)
+    canvas.circle((end + 19, y - 5), 4.6, PROJECTED, 1.7)
+    canvas.text(end + 29, y, sheet.words["circle"], 12.5, DIM, most=x + width - end - 29)
 
 
 # ---- numbers, scale and legend ----
@@ -375,7 +375,7 @@ def _card(
     canvas.text(x + 15, y + 25, sheet.words[which], 14, INK, 600, most=width - 22)
     end = canvas.text(x + 15, y + 58, value[0], 29, colour, 700)
     canvas.text(end + 4, y + 58, value[1], 16, colour, 600)
-    canvas.paragraph(x + 15, y + 80, note, 12.5, DIM, most=width - 24, step=17)
+    canvas.paragraph(x + 15, y + 80, note, 12, DIM, most=width - 23, step=17)
 
 
 def _warning(sheet: Sheet) -> tuple[str, float, Colour, int] | None:

@@ -59,7 +59,7 @@ def curves(
     lower = Axes(left, right, y + 164, y + 296, 4.0 * max(3.0, np.ceil(d_s / 4.0)))
     canvas.text(x, y + 6, words["d_l_axis"], 13, D_L, 650)
     band_words = words["band"].format(tolerance=f"{curves.tolerance_percent:g}")
-    start = canvas.text(x + width, y + 6, band_words, 11.5, DIM, anchor="end")
+    start = canvas.text(x + width, y + 6, band_words, 11, DIM, anchor="end")
     canvas.fill(start - 18, y - 4, 13, 11, BAND)
     canvas.text(x, y + 150, words["d_s_axis"], 13, D_S, 650)
     band = float(upper.y(curves.tolerance_percent))
@@ -139,7 +139,7 @@ def apart(
     inside = [min(max(m, low + w / 2), high - w / 2) for m, w in zip(middles, widths, strict=True)]
     if len(inside) < 2:
         return inside
-    first, second = (0, 1) if inside[0] <= inside[1] else (1, 0)
+    first, second = (0, 1) if middles[0] <= middles[1] else (1, 0)
     need = (widths[0] + widths[1]) / 2
     if inside[second] - inside[first] < need:
         centre = (inside[0] + inside[1]) / 2
