@@ -103,29 +103,27 @@ def gram(model: FaceModel) -> Array:
 
 def _region_changes(model: FaceModel, S: int, f: Array) -> dict[str, Array]:
     """Mean movement (3,) of each named region along f: x outward on both sides, y up, z forward; metres."""
-    changes = {}
-    for name, modes, outward in _regions(model):
-        moved = modes[:, :, :S] @ f
-        changes[name] = np.array([(outward * moved[:, 0]).mean(), *moved[:, 1:].mean(axis=0)])
-    return changes
+    return {name: modes[:, :S] @ f for name, modes in _regions(model)}
 
 
 @lru_cache(maxsize=8)
-def _regions(model: FaceModel) -> tuple[tuple[str, Array, Array], ...]:
-    """(name, modes (R, 3, S), side (R,) +1 left, -1 right) of each region; the whole face if none is named."""
-    parts = model.regions or {"face": np.arange(model.n_vertices)}
+def _regions(model: FaceModel) -> tuple[tuple[str, Array], ...]:
+    """(name, mean movement (3, S) by each mode) of the regions that d_S measures and of the ears.
+
+    The back of the head is free to follow and would always be the loudest. A model that names no part is one "face".
+    """
+    every = np.arange(model.n_vertices) if model.evaluation is None else model.evaluation
+    parts = {
+        name: vertices
+        for name, vertices in model.regions.items()
+        if name == "ears" or np.isin(vertices, every).mean() > 0.5
+    }
     rows = []
-    for name, vertices in parts.items():
-        measured = model.evaluation is None or np.isin(vertices, model.evaluation).mean() > 0.5
-        if (
-            not measured and name != "ears"
-        ):  # the back of the head is free to follow and would be the loudest
-            continue
-        sample = vertices[
-            :: max(1, len(vertices) // 150)
-        ]  # a mean over 150 vertices is a word's worth of precision
-        mean, modes = model.rows(sample)
-        rows.append((name, modes, np.sign(mean[:, 0])))
+    for name, vertices in (parts or {"face": every}).items():
+        mean, modes = model.rows(vertices)
+        outward = np.sign(mean[:, 0])  # +1 left, -1 right
+        x = outward @ modes[:, 0] / len(vertices)
+        rows.append((name, read_only(np.stack([x, *modes[:, 1:].mean(axis=0)]))))
     return tuple(rows)
 
 
