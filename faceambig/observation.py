@@ -49,7 +49,7 @@ class Observation:
             if (weights < 0).any():
                 raise ValueError(f"weights: {weights.min():g} is negative")
             object.__setattr__(self, "weights", read_only(weights))
-        if self.image_size is not None and min(self.image_size) < 1:
+        if self.image_size is not None and checked("image_size", self.image_size, (2,)).min() < 1:
             raise ValueError(f"image_size: {self.image_size} is not a width and a height in pixels")
         if self.principal_point is not None:
             checked("principal_point", self.principal_point, (2,))
@@ -98,10 +98,11 @@ class Observation:
                     f"points: {len(self.points)} for scheme {scheme.name!r}, which has {len(scheme)}"
                 )
             return scheme.vertices
-        if self.scheme.min() < 0 or self.scheme.max() >= model.n_vertices:
-            raise ValueError(
-                f"scheme: vertex {self.scheme.max()} is not within 0 to {model.n_vertices - 1}"
-            )
+        for number in (self.scheme.min(), self.scheme.max()):
+            if not 0 <= number < model.n_vertices:
+                raise ValueError(
+                    f"scheme: vertex {number} is not within 0 to {model.n_vertices - 1}"
+                )
         return self.scheme
 
 
@@ -130,6 +131,8 @@ def portrait_camera(
         raise ValueError(
             f"distance: {distance:g} m is not within {DISTANCES[0]:g} to {DISTANCES[1]:g}"
         )
+    if not 1 <= eyes_px < np.inf:
+        raise ValueError(f"eyes_px: {eyes_px:g} is not a distance of at least 1 pixel")
     kappa = 0.0 if distance is None else 1.0 / distance
     points = face.vertices[face.model.scheme(scheme).vertices]
     frontal = Camera(rotation_from_angles(0, 0, 0), np.zeros(2), 1.0, kappa)
