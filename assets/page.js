@@ -4,6 +4,10 @@
 (() => {
   "use strict";
 
+  // ---- dark -------------------------------------------------------------------------------------------------------
+  // The page follows the system. viser reads this at its start, for pages that stand inside others; `?darkMode` still forces it.
+  window.__VISER_EMBED_CONFIG__ = { darkMode: window.matchMedia("(prefers-color-scheme: dark)").matches };
+
   // ---- keys -------------------------------------------------------------------------------------------------------
   // viser turns and flies the camera by these keys wherever the focus is, typing excepted. Its listener is on the
   // document too and comes after ours; what the focused control does with the key has happened by then.

@@ -18,9 +18,9 @@ from .text import NARROW, centimetres, distance_text, percent_number, say
 
 STYLE = """<style>
 :root{--fa-ink:#1D2733;--fa-dim:#52606D;--fa-line:#D5DCE3;--fa-card:#F6F8FA;--fa-band:#E3EAF2;
---fa-dl:#1B5FC1;--fa-ds:#A84A00}
+--fa-dl:#1B5FC1;--fa-ds:#A84A00;--fa-seen:#C8102E}
 [data-mantine-color-scheme=dark]{--fa-ink:#E9EEF3;--fa-dim:#A9B4BF;--fa-line:#3C4650;--fa-card:#252A30;
---fa-band:#2B3540;--fa-dl:#7AB7FF;--fa-ds:#FFAB66}
+--fa-band:#2B3540;--fa-dl:#7AB7FF;--fa-ds:#FFAB66;--fa-seen:#FF7A85}
 .fa{color:var(--fa-ink);font-size:14px;line-height:1.45;padding:0 .75em .35em}
 .fa h1{font-size:17px;font-weight:650;margin:.5em 0 .3em}
 .fa p{margin:.35em 0}.fa small{font-size:12.5px;color:var(--fa-dim)}
@@ -43,7 +43,9 @@ font-size:12.5px;padding:1px 7px;border-radius:4px}
 .fa-both .fa{padding-right:0}.fa-both .fa+.fa{padding-right:.75em}.fa-both .fa-cards{grid-template-columns:1fr}
 canvas[data-engine]{background:#F3F6F9}[data-mantine-color-scheme=dark] canvas[data-engine]{background:#181C21}
 .mantine-Slider-root:has(.mantine-Slider-markLabel){padding-bottom:20px!important}
-.mantine-Slider-markLabel{margin-top:7px}
+.mantine-Slider-markLabel{margin-top:7px;font-size:11px!important;color:var(--fa-dim)!important}
+label[for]{color:var(--fa-dim)!important;letter-spacing:0!important;font-size:13px!important}
+[data-mantine-color-scheme=dark] .mantine-Tabs-tab{color:#7AB7FF!important}
 @media(max-width:576px){.mantine-Paper-root[style*="20em"]{width:100%!important;left:0!important;right:0!important}
 .mantine-ScrollArea-content>div[style*="20em"]{width:100%!important}}
 .fa-warn{border-left:4px solid #C8102E;padding-left:8px}
@@ -139,8 +141,8 @@ def photo_marks(photo: Photo) -> str:
         f'<g stroke="#FFF" stroke-width="{halo:.1f}"><use href="#fx"/><use href="#fo"/></g>'
         f'<g stroke-width="{thin:.1f}"><use href="#fx" stroke="{RED}"/><use href="#fo" stroke="{BLUE}"/></g></svg>'
         f"<em>{escape(photo.caption)}</em></div>"
-        f'<div class="fa-key"><span>{_key(_cross(6, 6, 4), RED)}{escape(say("app.cross"))}</span>'
-        f"<span>{_key(_circle(6, 6, 4.5), BLUE)}{escape(say('app.circle'))}</span></div></div>"
+        f'<div class="fa-key"><span>{_key(_cross(6, 6, 4), "seen")}{escape(say("app.cross"))}</span>'
+        f"<span>{_key(_circle(6, 6, 4.5), 'dl')}{escape(say('app.circle'))}</span></div></div>"
     )
 
 
@@ -159,8 +161,9 @@ def _circle(x: float, y: float, r: float) -> str:
     return f"M{x - r:.1f} {y:.1f}a{r:.1f} {r:.1f} 0 1 0 {2 * r:.1f} 0a{r:.1f} {r:.1f} 0 1 0 {-2 * r:.1f} 0"
 
 
-def _key(path: str, colour: str) -> str:
-    return f'<svg viewBox="0 0 12 12"><path d="{path}" fill="none" stroke="{colour}" stroke-width="1.8"/></svg>'
+def _key(path: str, tone: str) -> str:
+    style = f"fill:none;stroke:var(--fa-{tone});stroke-width:1.8"
+    return f'<svg viewBox="0 0 12 12"><path d="{path}" style="{style}"/></svg>'
 
 
 def plots(curves: Curves, numbers: Numbers) -> str:

@@ -52,12 +52,12 @@ class Browser:
         )
         gui.set_panel_label(say("app.title"))
         people = tuple(subject.name for subject in model(state.model).subjects)
-        phone = self.stage.phone
+        narrow = self.stage.narrow
         self._style = gui.add_html("")
-        if phone:  # there is one sheet: the photograph comes first, beside the numbers
+        if narrow:  # one panel: the photograph comes first, beside the numbers
             self._add_photo(gui)
         self.panel = Panel(gui, state, people, self._heard)
-        self._cards = None if phone else gui.add_html("")
+        self._cards = None if narrow else gui.add_html("")
         self._plots, self._spoken, self._words = (
             gui.add_html(""),
             gui.add_html(""),
@@ -66,15 +66,15 @@ class Browser:
         self.panel.build_rest(state)
         self._style.content = figures.STYLE + figures.hidden_boxes(self.panel.index_sliders)
         self._heading: viser.GuiHtmlHandle | None = None
-        if not phone:
+        gui.main_panel.dock_right()
+        gui.main_panel.set_width(SIDE_WIDTH)
+        if not narrow:
             side = gui.add_panel()
             with side.add_tab(say("panel.photo")):
                 self._heading = gui.add_html("")
                 self._add_photo(gui)
             side.dock_left()
             side.set_width(SIDE_WIDTH)
-            gui.main_panel.dock_right()
-            gui.main_panel.set_width(SIDE_WIDTH)
 
     def _add_photo(self, gui: viser.GuiApi) -> None:
         self._picture, self._marks = gui.add_html(""), gui.add_html("")

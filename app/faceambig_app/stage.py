@@ -22,6 +22,7 @@ LENS = 20.0  # metres to the viewer: a head 0.2 m deep is true to 0.5 %
 NEAR, FAR = 0.5, 60.0  # with 18 and 22 the canvas stayed blank behind a background picture
 HALF_WIDTH = 0.255  # metres: both heads and a little air
 TITLE_AT, BAR_AT = 0.155, -0.165  # metres above and below the pivot
+NARROW = 1100  # pixels: two panels of 372 leave too little for two heads
 PHONE = 577  # pixels: at most 576 wide, viser shows its panel as a sheet over the lower part
 PHONE_HEADS_AT = 0.19  # share of the height, from the top, where the heads stand above the sheet
 TO_WORLD = np.array(
@@ -41,17 +42,17 @@ class Stage:
 
     def __init__(self, client: viser.ClientHandle) -> None:
         self._client, self._scene = client, client.scene
+        # Of the window, so asked before a panel is docked and takes its share of the canvas
+        self.phone = (
+            0 < client.camera.image_width < PHONE
+        )  # viser's panel is a sheet over the scene
+        self.narrow = 0 < client.camera.image_width < NARROW  # no room for a second panel
         self._heads: dict[str, HeadNodes] = {}
         self._view: View | Lens | None = None
         self._board = np.eye(3)
         self._size = (0, 0)  # pixels of the canvas the zoom was made for
         self._light_room()
         client.camera.on_update(self._turned)
-
-    @property
-    def phone(self) -> bool:
-        """Whether the browser is so narrow that viser shows its panel as a sheet."""
-        return 0 < self._client.camera.image_width < PHONE
 
     def show(self, scene: Scene, draft: bool) -> None:
         """Draw the heads; a draft has the coarse mesh. Call inside client.atomic()."""

@@ -180,8 +180,12 @@ def check(field: Field, value: Any) -> None:
         )
     if not field.low <= value <= field.high:  # False for NaN too
         unit = f" {field.unit}" if field.unit else ""
+        try:
+            shown = f"{value:g}"
+        except OverflowError:  # a whole number beyond every float
+            shown = "a number of that many digits"
         raise ValueError(
-            f"{field.name}: {value:g} is not within {field.low:g} to {field.high:g}{unit}"
+            f"{field.name}: {shown} is not within {field.low:g} to {field.high:g}{unit}"
         )
 
 
@@ -192,6 +196,8 @@ def clamp(field: Field, value: Any) -> tuple[Any, bool]:
         return value, False
     try:
         number = float(value)
+    except OverflowError:  # a whole number beyond every float
+        number = math.copysign(math.inf, value)
     except (TypeError, ValueError) as error:
         raise ValueError(f"{field.name}: {value!r} is not a number") from error
     if math.isnan(number):
@@ -214,7 +220,7 @@ def parse(kind_of: Field, text: str) -> Any:
         return kind_of.kind(text)
     except ValueError as error:
         raise ValueError(
-            f"{kind_of.name}: {text!r} is not a {'whole ' if kind_of.kind is int else ''}number"
+            f"{kind_of.name}: {text!r:.60} is not a {'whole ' if kind_of.kind is int else ''}number"
         ) from error
 
 
