@@ -197,7 +197,7 @@ def clamp(field: Field, value: Any) -> tuple[Any, bool]:
     try:
         number = float(value)
     except OverflowError:  # a whole number beyond every float
-        number = math.copysign(math.inf, value)
+        number = math.inf if value > 0 else -math.inf
     except (TypeError, ValueError) as error:
         raise ValueError(f"{field.name}: {value!r} is not a number") from error
     if math.isnan(number):
