@@ -21,7 +21,7 @@ from faceambig.model import FaceModel, Subject
 from faceambig.observation import portrait_camera
 from faceambig.scene import Curves, Photo, Scene
 
-from .state import Bend, Fitting, Look, Target, ViewState
+from .state import DEFAULT, FIELDS, Bend, Fitting, Look, Target, ViewState
 from .text import centimetres, distance_text, percent_number, say
 
 ROW_DISTANCES = (0.3, 0.6, 1.2, 2.4)  # metres, of the strip of faces
@@ -218,10 +218,18 @@ def snapshot(
 
 
 def state_json(state: ViewState) -> str:
-    """The state as JSON, defaults left out."""
+    """The state as JSON, defaults left out; equal states give the same text."""
     import msgspec
 
-    return msgspec.json.encode(state).decode()
+    # Not encode(state): that leaves a float out only if it is the default's own object, and 10 is not 10.0
+    values = {name: field.kind(getattr(state, name)) for name, field in FIELDS.items()}
+    values |= {"v": state.v, "model": state.model}
+    written = {
+        name: values[name]
+        for name in state.__struct_fields__
+        if values[name] != getattr(DEFAULT, name)
+    }
+    return msgspec.json.encode(written).decode()
 
 
 def writable(path: Path) -> None:
