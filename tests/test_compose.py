@@ -139,6 +139,8 @@ def test_an_orthographic_fit_is_drawn_from_a_distance_that_stands_for_far_away(
     apart = []
     for distance in (3.0, 6.0):
         photo = fc.with_fit(picture, face, whole=True, draw_from=distance)
+        assert photo.fit_vertices is not None
+        assert photo.fit_focal is not None
         points = seen(photo.fit_vertices[at], photo.fit_focal, photo.principal)
         apart.append(np.abs(points - photo.projected).max())
     # 3 m moves points q_z / 3 m of their way from the middle: at most 0.1 / 3 of 150 px; half of that from 6 m

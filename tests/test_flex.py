@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -27,7 +28,11 @@ AXES = {
 CAMERAS = [("perspective", 0.3), ("perspective", 1.2), ("orthographic", None)]
 
 
-def fitted(seed: int = 0, camera: str = "perspective", distance: float | None = 0.5) -> fa.Fit:
+def fitted(
+    seed: int = 0,
+    camera: Literal["perspective", "orthographic"] = "perspective",
+    distance: float | None = 0.5,
+) -> fa.Fit:
     face = face_of(MODEL, np.random.default_rng(seed).standard_normal(S))
     observation = fa.observe(
         face, distance=0.5, scheme="all", yaw_deg=20, noise_percent=1, seed=seed
@@ -184,6 +189,7 @@ def test_a_face_that_is_beyond_the_limit_by_itself_has_no_reach():
 def region_movements(model: fa.FaceModel, f: np.ndarray) -> dict[str, np.ndarray]:
     """(3,) outward, up, forward of every vertex of each named region that d_S measures, and of the ears."""
     moved = surface_change(model, f)
+    assert model.evaluation is not None
     named = {}
     for name, vertices in model.regions.items():
         if name == "ears" or np.isin(vertices, model.evaluation).mean() > 0.5:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -82,11 +84,12 @@ def test_the_centre_is_given_or_the_pictures_or_the_points():
     points = np.vstack([POINTS, [[np.nan, np.nan]]])
     numbers = np.append(np.arange(24), 3)
     middle = (POINTS.min(axis=0) + POINTS.max(axis=0)) / 2
-    for given_, centre, meaning in (
+    cases: tuple[tuple[dict[str, Any], list[float], str], ...] = (
         ({"principal_point": (10, 20), "image_size": (640, 480)}, [10, 20], "given"),
         ({"image_size": (640, 480)}, [320, 240], "middle of the picture"),
         ({}, middle.tolist(), "middle of the points"),
-    ):
+    )
+    for given_, centre, meaning in cases:
         observation = fa.Observation(points, numbers, **given_)
         assert observation.centre.tolist() == centre
         assert observation.centre_meaning == meaning
@@ -104,9 +107,11 @@ def test_a_point_is_visible_if_it_is_given_and_weighs_something():
 
 def test_vertices_are_those_of_the_scheme_or_the_numbers():
     assert fa.Observation(POINTS, "all").vertices(MODEL).tolist() == list(range(24))
-    numbers = np.arange(24, dtype=np.uint16)[::-1]
-    assert fa.Observation(POINTS, numbers).vertices(MODEL).tolist() == numbers.tolist()
-    assert fa.Observation(POINTS, list(range(24))).vertices(MODEL).dtype == np.intp
+    backwards: Any
+    for backwards in (list(range(23, -1, -1)), np.arange(24, dtype=np.uint16)[::-1]):
+        vertices = fa.Observation(POINTS, backwards).vertices(MODEL)
+        assert vertices.dtype == np.intp
+        assert vertices.tolist() == list(range(23, -1, -1))
 
 
 @pytest.mark.parametrize(
