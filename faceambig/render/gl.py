@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import atexit
 import ctypes
-import itertools
 import os
 import queue
 import sys
@@ -18,7 +17,7 @@ import types
 from collections.abc import Callable
 from concurrent.futures import Future
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple, TypeVar
 
 import cv2
 import numpy as np
@@ -28,11 +27,11 @@ from ..arrays import Array, IntArray
 from ..scene import Head, View
 from .painter import vertex_normals
 
+T = TypeVar("T")
 LIBRARIES = {"osmesa": ("libOSMesa.so.8",), "egl": ("libEGL.so.1", "libGL.so.1")}
 INSTALL = "sudo apt-get install libegl1 libgl1 libgl1-mesa-dri libosmesa6"
-FRAMES = (
-    20  # of one OSMesa renderer: it loses 2 to 7 MB a frame and gives them back when it is deleted
-)
+# Frames of one OSMesa renderer: it loses 2 to 7 MB a frame and gives them back when it is deleted.
+FRAMES = 20
 EYE, NEAR, FAR = (
     20.0,
     18.0,
@@ -54,8 +53,6 @@ SHEEN, SHEEN_WIDTH = 0.075, 16  # highlight on skin: strength, and the power tha
 INSIDE = 0.42  # sRGB grey of back faces: a cut surface, never a look into the empty head
 
 BEAD, BEAD_COLOUR = 0.0013, (0x1B, 0x5F, 0xC1)  # metres, sRGB: a landmark on a head
-
-_count = itertools.count()
 
 
 class NoRendererError(RuntimeError):
@@ -92,6 +89,16 @@ def viewer_rotation(view: View) -> Array:
     return np.array([right, up, towards])
 
 
+class Mesh(NamedTuple):
+    """What the render thread is given. V vertices, F triangles, viewer axes."""
+
+    points: Array  # (V, 3) metres
+    normals: Array  # (V, 3)
+    faces: NDArray[np.uint32]  # (F, 3)
+    colours: Array  # (V, 3) linear light if lit, else sRGB, 0 to 1
+    lit: bool
+
+
 def render_head(
     head: Head,
     view: View,
@@ -112,26 +119,13 @@ def render_head(
     points[:, :2] -= middle
     normals = vertex_normals(head.vertices, head.faces) @ R.T
     colours = _lit_colours(head, normals) if head.lit else _shown_colours(head, normals)
-    faces = head.faces
+    mesh = Mesh(points, normals, head.faces, colours, head.lit)
     if marked is not None and len(marked):
-        points, normals, faces, colours = _with_beads(
-            points, normals, faces, colours, points[marked], head.lit
-        )
+        mesh = _with_beads(mesh, points[marked])
     factor = 2 if 4 * width * height <= LARGEST else 1
+    size = (factor * width, factor * height)
     half = (width / (2 * pixels_per_metre), height / (2 * pixels_per_metre))
-    large = _studio().call(
-        lambda pyrender, renderer: _frame(
-            pyrender,
-            renderer,
-            points,
-            normals,
-            faces,
-            colours,
-            head.lit,
-            half,
-            (factor * width, factor * height),
-        )
-    )
+    large = _studio().call(lambda pyrender, renderer: _frame(pyrender, renderer, mesh, half, size))
     return _reduced(large, factor)
 
 
@@ -139,9 +133,8 @@ def _lit_colours(head: Head, normals: Array) -> Array:
     """(V, 3) linear: what the shader multiplies the lamps' light by. normals (V, 3) in viewer axes."""
     colours = srgb_to_linear(head.colours / 255.0)
     open_ = np.ones(len(colours)) if head.occlusion is None else head.occlusion / 255.0
-    bright = np.clip(
-        colours.mean(axis=1) / 0.06, 0.0, 1.0
-    )  # pupils and brows do not shine as skin does
+    # Pupils and brows do not shine as skin does.
+    bright = np.clip(colours.mean(axis=1) / 0.06, 0.0, 1.0)
     # Light that reaches a fold has met skin before: it loses blue and green first, so folds are warm and not grey.
     colours *= open_[:, None] ** (0.9, 1.2, 1.25)
     # pyrender tints highlights with the vertex colour; on skin they are white. They are added here, divided by the
@@ -167,25 +160,22 @@ def _shown_colours(head: Head, normals: Array) -> Array:
     return head.colours / 255.0 * shade[:, None]
 
 
-def _with_beads(
-    points: Array, normals: Array, faces: NDArray[np.uint32], colours: Array, at: Array, lit: bool
-) -> tuple[Array, Array, NDArray[np.uint32], Array]:
+def _with_beads(mesh: Mesh, at: Array) -> Mesh:
     """The mesh with a small ball at each of `at` (M, 3): hidden where the face hides it."""
     import trimesh
 
     ball = trimesh.creation.icosphere(subdivisions=1, radius=1.0)
-    shape, triangles = np.asarray(ball.vertices), np.asarray(ball.faces)
-    starts = len(points) + len(shape) * np.arange(len(at))
+    shape = np.asarray(ball.vertices)
+    starts = len(mesh.points) + len(shape) * np.arange(len(at))
+    triangles = (starts[:, None, None] + np.asarray(ball.faces)).reshape(-1, 3).astype(np.uint32)
     colour = np.array(BEAD_COLOUR) / 255.0
-    shown = srgb_to_linear(colour) if lit else colour
-    n = len(at)
-    return (
-        np.concatenate([points, (at[:, None] + BEAD * shape).reshape(-1, 3)]),
-        np.concatenate([normals, np.tile(shape, (n, 1))]),
-        np.concatenate(
-            [faces, (starts[:, None, None] + triangles).reshape(-1, 3).astype(np.uint32)]
-        ),
-        np.concatenate([colours, np.tile(shown, (n * len(shape), 1))]),
+    shown = srgb_to_linear(colour) if mesh.lit else colour
+    return Mesh(
+        np.concatenate([mesh.points, (at[:, None] + BEAD * shape).reshape(-1, 3)]),
+        np.concatenate([mesh.normals, np.tile(shape, (len(at), 1))]),
+        np.concatenate([mesh.faces, triangles]),
+        np.concatenate([mesh.colours, np.tile(shown, (len(at) * len(shape), 1))]),
+        mesh.lit,
     )
 
 
@@ -208,58 +198,53 @@ def _reduced(large: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:
 
 
 def _frame(
-    pyrender: Any,
-    renderer: Any,
-    points: Array,
-    normals: Array,
-    faces: NDArray[np.uint32],
-    colours: Array,
-    lit: bool,
-    half: tuple[float, float],
-    size: tuple[int, int],
+    pyrender: Any, renderer: Any, mesh: Mesh, half: tuple[float, float], size: tuple[int, int]
 ) -> NDArray[np.uint8]:
-    """(H, W, 4) RGBA of one mesh in viewer axes, straight from the frame buffer. Runs in the render thread."""
-    Node = _node_class(pyrender)
-    material = pyrender.MetallicRoughnessMaterial(
-        baseColorFactor=[1.0, 1.0, 1.0, 1.0], metallicFactor=0.0, roughnessFactor=ROUGHNESS
-    )
-    outside = _primitive(pyrender, points, normals, faces, colours, material)
-    # Back faces are the same triangles wound the other way, of one grey: their normals point where no lamp is and
-    # the light comes from the material itself.
+    """(H, W, 4) RGBA of a mesh, straight from the frame buffer. Runs in the render thread."""
+    renderer.viewport_width, renderer.viewport_height = size
+    flags = pyrender.RenderFlags.RGBA | (0 if mesh.lit else pyrender.RenderFlags.FLAT)
+    return renderer.render(_scene(pyrender, mesh, half), flags=flags)[0]
+
+
+def _scene(pyrender: Any, mesh: Mesh, half: tuple[float, float]) -> Any:
+    """pyrender's scene of a mesh, `half` metres shown to each side and up and down."""
+    outside = _primitive(pyrender, mesh, metallicFactor=0.0, roughnessFactor=ROUGHNESS)
+    # Back faces are the same triangles wound the other way, of one grey: their normals point where no lamp is, the
+    # base is black, and the light comes from the material itself.
+    points, lit = mesh.points, mesh.lit
     down = np.tile([0.0, -1.0, 0.0], (len(points), 1))
     grey = np.full((len(points), 3), srgb_to_linear(INSIDE) if lit else INSIDE)
-    glowing = pyrender.MetallicRoughnessMaterial(
+    inside = _primitive(
+        pyrender,
+        Mesh(points, down, mesh.faces[:, ::-1], grey, lit),
         baseColorFactor=[0.0, 0.0, 0.0, 1.0] if lit else [1.0, 1.0, 1.0, 1.0],
-        emissiveFactor=[1.0, 1.0, 1.0], metallicFactor=0.0, roughnessFactor=1.0,
-    )  # fmt: skip
-    inside = _primitive(pyrender, points, down, faces[:, ::-1], grey, glowing)
+        emissiveFactor=[1.0, 1.0, 1.0],
+    )
     scene = pyrender.Scene(bg_color=[0.0, 0.0, 0.0, 0.0], ambient_light=AMBIENT)
-    scene.add_node(Node(mesh=pyrender.Mesh([outside, inside])))
+    Node = _node_class(pyrender)
+    scene.add_node(Node(0, mesh=pyrender.Mesh([outside, inside])))
     eye = np.eye(4)
     eye[2, 3] = EYE
     lens = pyrender.OrthographicCamera(half[0], half[1], znear=NEAR, zfar=FAR)
-    scene.add_node(Node(camera=lens, matrix=eye))
-    for direction, colour, intensity in LIGHTS:
-        scene.add_node(
-            Node(light=pyrender.DirectionalLight(colour, intensity), matrix=_facing(direction))
-        )
-    renderer.viewport_width, renderer.viewport_height = size
-    flags = pyrender.RenderFlags.RGBA | (0 if lit else pyrender.RenderFlags.FLAT)
-    return renderer.render(scene, flags=flags)[0]
+    scene.add_node(Node(1, camera=lens, matrix=eye))
+    for number, (direction, colour, intensity) in enumerate(LIGHTS, start=2):
+        lamp = pyrender.DirectionalLight(colour, intensity)
+        scene.add_node(Node(number, light=lamp, matrix=_facing(direction)))
+    return scene
 
 
-def _primitive(
-    pyrender: Any, points: Array, normals: Array, faces: NDArray, colours: Array, material: Any
-) -> Any:
+def _primitive(pyrender: Any, mesh: Mesh, **material: Any) -> Any:
+    """Triangles for pyrender; material: what differs from a white one."""
+    material = {"baseColorFactor": [1.0, 1.0, 1.0, 1.0]} | material
+    # Floats: integer colours would be divided by 255.
+    rgba = np.column_stack([mesh.colours, np.ones(len(mesh.colours))])
     return pyrender.Primitive(
-        positions=points.astype(np.float32),
-        normals=normals.astype(np.float32),
-        indices=np.ascontiguousarray(faces, dtype=np.uint32),
-        color_0=np.column_stack([colours, np.ones(len(colours))]).astype(
-            np.float32
-        ),  # integers would be halved by 255
+        positions=mesh.points.astype(np.float32),
+        normals=mesh.normals.astype(np.float32),
+        indices=np.ascontiguousarray(mesh.faces, dtype=np.uint32),
+        color_0=rgba.astype(np.float32),
         mode=4,
-        material=material,
+        material=pyrender.MetallicRoughnessMaterial(**material),
     )
 
 
@@ -287,9 +272,9 @@ class Studio:
         self._thread = threading.Thread(target=self._work, name="faceambig-render", daemon=True)
         self._thread.start()
 
-    def call(self, job: Callable[[Any, Any], NDArray[np.uint8]]) -> NDArray[np.uint8]:
+    def call(self, job: Callable[[Any, Any], T]) -> T:
         """job(pyrender, renderer) run in the render thread; what it raises is raised here."""
-        future: Future[NDArray[np.uint8]] = Future()
+        future: Future[T] = Future()
         self._jobs.put((job, future))
         return future.result()
 
@@ -392,16 +377,16 @@ def _bounds(mesh: Any) -> Array:
 
 @cache
 def _node_class(pyrender: Any) -> Any:
-    """pyrender.Node with a running number as its hash.
+    """pyrender.Node hashed by its number in the scene.
 
     pyrender keeps lights in a set. Hashed by address they are summed in another order, and rounded differently, from
-    process to process.
+    process to process; a number that ran on from scene to scene would do so from picture to picture.
     """
 
     class Node(pyrender.Node):
-        def __init__(self, **options: Any) -> None:
+        def __init__(self, number: int, **options: Any) -> None:
             super().__init__(**options)
-            self._number = next(_count)
+            self._number = number
 
         def __hash__(self) -> int:
             return self._number
