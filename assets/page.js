@@ -14,7 +14,19 @@
   const FLIES = /^(Arrow(Up|Down|Left|Right)|Home|End|Key[WASDQE])$/;
   const CONTROL = "[role], button, a[href], summary, [tabindex]";
   document.addEventListener("keydown", (event) => {
-    if (FLIES.test(event.code) && event.target.closest?.(CONTROL)) event.stopImmediatePropagation();
+    const camera = window.__viserMutable?.cameraControl;
+    const lens = camera && camera.minDistance === camera.maxDistance; // at a fixed distance: flying would change it
+    if (FLIES.test(event.code) && (event.target.closest?.(CONTROL) || (lens && event.code.startsWith("Key")))) {
+      event.stopImmediatePropagation();
+    }
+  });
+
+  // A folder opens by Enter and Space like any button (`nameControls` makes it one).
+  const CHEVRON = ".mantine-Paper-root > .mantine-Paper-root > [class*=tabler-icon-chevron]";
+  document.addEventListener("keydown", (event) => {
+    if ((event.key !== "Enter" && event.key !== " ") || !event.target.matches?.(".mantine-Paper-root[role=button]")) return;
+    event.preventDefault(); // Space would scroll
+    event.target.click();
   });
 
   // ---- look -------------------------------------------------------------------------------------------------------
@@ -31,12 +43,18 @@
   const pressed = {}; // label of a button group -> the option that is on
   const valuetext = {}; // label of a slider -> its value in words
   const coloured = new Map(); // name of a node -> what is set on its mesh
+  const icons = {}; // viser's icon -> name of the button that shows it
   const seen = new WeakSet(); // viser makes new elements when the content changes
   const readers = {
     title: (element) => (document.title = JSON.parse(element.dataset.json)),
     pressed: (element) => Object.assign(pressed, JSON.parse(element.dataset.json)),
     valuetext: (element) => Object.assign(valuetext, JSON.parse(element.dataset.json)),
-    colours: (element) => setColours(element.dataset.node, element.dataset.rgb),
+    icons: (element) => Object.assign(icons, JSON.parse(element.dataset.json)),
+    colours: (element) => {
+      const array = linear(Uint8Array.from(atob(element.dataset.rgb), (c) => c.charCodeAt(0)));
+      for (const node of element.dataset.node.split(" ")) setColours(node, array);
+      window.__viserMutable?.requestRender();
+    },
   };
 
   function readData() {
@@ -77,6 +95,19 @@
         if (name in pressed) set(option, "aria-pressed", String(option.textContent === pressed[name]));
       }
     }
+    for (const [icon, name] of Object.entries(icons)) {
+      for (const drawn of document.querySelectorAll(`button .tabler-icon-${icon}`)) {
+        set(drawn.closest("button"), "aria-label", name);
+      }
+    }
+    for (const chevron of document.querySelectorAll(CHEVRON)) {
+      const head = chevron.parentElement; // of a folder: viser lets only a mouse open it
+      set(head, "role", "button");
+      set(head, "tabindex", "0");
+      set(head, "aria-expanded", String(chevron.matches(".tabler-icon-chevron-up")));
+      set(head.parentElement, "role", "group");
+      set(head.parentElement, "aria-label", head.textContent.trim());
+    }
   }
 
   // ---- colours of vertices ------------------------------------------------------------------------------------------
@@ -87,15 +118,39 @@
     return c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4;
   });
 
-  function setColours(nodes, rgb) {
-    const bytes = atob(rgb);
+  function linear(bytes) {
     const array = new Float32Array(bytes.length);
-    for (let i = 0; i < array.length; i++) array[i] = LINEAR[bytes.charCodeAt(i)];
-    for (const node of nodes.split(" ")) {
-      const entry = coloured.get(node) ?? {};
-      coloured.set(node, { ...entry, array, fresh: true });
+    for (let i = 0; i < array.length; i++) array[i] = LINEAR[bytes[i]];
+    return array;
+  }
+
+  function setColours(node, array) {
+    coloured.set(node, { ...coloured.get(node), array, fresh: true });
+  }
+
+  // A hidden cloud of points "/x/colours" carries the colours of the meshes beside it. It comes with the vertices, in the
+  // same batch of messages, and unlike elements of a panel also while the panel is folded away.
+  const carried = new Map(); // name of a mesh -> the colours that a cloud brought for it
+  function readClouds() {
+    const tree = window.__viserSceneTree.getState();
+    for (const name of carried.keys()) {
+      const beside = name.slice(0, name.lastIndexOf("/")) + "/colours";
+      if (!tree[beside] || !tree[name]) {
+        carried.delete(name);
+        setColours(name, new Float32Array(0));
+      }
     }
-    window.__viserMutable?.requestRender();
+    for (const [cloud, node] of Object.entries(tree)) {
+      if (!cloud.endsWith("/colours") || node?.message?.type !== "PointCloudMessage") continue;
+      const bytes = node.message.props.colors;
+      let array = null; // one for all meshes
+      for (const [name, other] of Object.entries(tree)) {
+        const beside = name.slice(0, name.lastIndexOf("/")) + "/colours";
+        if (beside !== cloud || other?.message?.type !== "MeshMessage" || carried.get(name) === bytes) continue;
+        carried.set(name, bytes);
+        setColours(name, (array ??= linear(bytes)));
+      }
+    }
   }
 
   function meshOf(group) {
@@ -153,13 +208,12 @@
     const before = scene.onBeforeRender;
     scene.onBeforeRender = function (...args) {
       before.apply(this, args);
-      for (const [node, entry] of coloured) {
-        try {
-          colour(node, entry);
-        } catch (error) {
-          coloured.delete(node); // a picture without colours is better than none
-          console.error(`colours of ${node}:`, error);
-        }
+      try {
+        readClouds();
+        for (const [node, entry] of coloured) colour(node, entry);
+      } catch (error) {
+        scene.onBeforeRender = before; // pictures without colours are better than none
+        console.error("colours:", error);
       }
     };
     window.__viserMutable.requestRender();

@@ -223,7 +223,8 @@ def data_html(kind: str, value: object) -> str:
     """A hidden element for `gui.add_html` that our script reads.
 
     "title": text of the browser's tab. "pressed": label of a button group -> the option that is on.
-    "valuetext": label of a slider -> what a screen reader says for its number.
+    "valuetext": label of a slider -> what a screen reader says for its number. "icons": icon -> name of its button,
+    viser's gear is "adjustments".
     """
     return (
         f'<div hidden data-faceambig="{kind}" data-json="{html.escape(json.dumps(value))}"></div>'
@@ -233,18 +234,34 @@ def data_html(kind: str, value: object) -> str:
 def colour_html(node: str, colours: np.ndarray | None) -> str:
     """A hidden element for `gui.add_html`: colours (V, 3) uint8 sRGB of the vertices of a mesh node.
 
-    None takes them off. A mesh of fewer vertices takes the first ones.
+    None takes them off. A mesh of fewer vertices takes the first ones. Several nodes are separated by spaces.
+    What is in a folded panel or behind another tab does not reach the page: `add_colours` does.
     """
-    if colours is None:
-        packed = ""
-    elif colours.dtype == np.uint8 and colours.ndim == 2 and colours.shape[1] == 3:
+    packed = ""
+    if colours is not None:
+        _check(colours)
         packed = base64.b64encode(colours.tobytes()).decode()
-    else:
-        raise ValueError(f"colours must be (V, 3) uint8, not {colours.shape} {colours.dtype}")
     return (
         f'<div hidden data-faceambig="colours" data-node="{html.escape(node)}" '
         f'data-rgb="{packed}"></div>'
     )
+
+
+def add_colours(scene: viser.SceneApi, parent: str, colours: np.ndarray) -> viser.PointCloudHandle:
+    """Colours (V, 3) uint8 sRGB for the vertices of the meshes that stand directly below `parent`.
+
+    Assign new ones to `.colors`; `.remove()` takes them off. A mesh of fewer vertices takes the first ones. They travel
+    as a cloud of points that is never shown: in the same batch as vertices, whether or not a panel is open.
+    """
+    _check(colours)
+    return scene.add_point_cloud(
+        f"{parent}/colours", np.zeros(colours.shape), colours, point_size=0.001, visible=False
+    )
+
+
+def _check(colours: np.ndarray) -> None:
+    if colours.dtype != np.uint8 or colours.ndim != 2 or colours.shape[1] != 3:
+        raise ValueError(f"colours must be (V, 3) uint8, not {colours.shape} {colours.dtype}")
 
 
 # ---------------------------------------------------------------- starting
@@ -502,7 +519,7 @@ def _checked(raw: object, message_class: Any) -> Any:
     kind = content.get("type") if isinstance(content, dict) else None
     fields = _FIELDS.get(kind) if isinstance(kind, str) else None
     if fields is None:
-        raise ValueError(f"no such message: {str(kind)[:40]}")
+        raise ValueError("not one that the page sends")
     if content.keys() - {"type"} != fields.keys():
         raise ValueError(f"{kind}: fields missing or unknown")
     for name, holds in fields.items():

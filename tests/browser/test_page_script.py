@@ -65,8 +65,11 @@ def tiny(**options: Any) -> Tiny:
             "size": gui.add_vector2("Size", (1.0, 2.0)),
             "text": gui.add_text("Name", ""),
             "data": gui.add_html(""),
+            "folder": gui.add_folder("Pose", expand_by_default=False),
             "colours": gui.add_html(""),
         }
+        with made["folder"]:
+            gui.add_checkbox("Inside", False)
         scene.configure_default_lights(enabled=False)
         scene.configure_environment_map(None)
         scene.add_light_ambient(
@@ -199,6 +202,7 @@ def test_controls_have_names(server: Tiny, page: Page) -> None:
     server.made["data"].content = (
         guard.data_html("pressed", {"View": "3/4"})
         + guard.data_html("valuetext", {"Slider A": "120 cm"})
+        + guard.data_html("icons", {"adjustments": "Settings"})
         + guard.data_html("title", "Face <b>")
     )
     page.wait_for_function("() => document.title === 'Face <b>'", timeout=PATIENCE)
@@ -210,9 +214,40 @@ def test_controls_have_names(server: Tiny, page: Page) -> None:
     assert page.get_by_role("textbox", name="Size 2").count() == 1
     on = page.get_by_role("group", name="View").get_by_role("button", pressed=True)
     assert on.all_inner_texts() == ["3/4"]
+    assert page.get_by_role("button", name="Settings").count() == 1
     nameless = """[...document.querySelectorAll('[role=slider], input:not([type=hidden])')].filter(
       e => e.offsetParent && !e.getAttribute('aria-label') && !e.labels?.length).length"""
     assert page.evaluate(nameless) == 0
+
+
+def test_a_folder_opens_by_keyboard(page: Page) -> None:
+    head = page.get_by_role("group", name="Pose").get_by_role("button", name="Pose")
+    inside = page.get_by_role("checkbox", name="Inside")
+    for key, shown in (("Enter", True), (" ", False)):
+        head.focus()
+        page.keyboard.press(key)
+        assert until(lambda shown=shown: head.get_attribute("aria-expanded") == str(shown).lower())
+        assert until(lambda shown=shown: inside.is_visible() is shown)
+
+
+def test_flying_keys_do_nothing_through_a_long_lens(server: Tiny, page: Page) -> None:
+    camera = server.client.camera
+    camera.min_orbit_distance = camera.max_orbit_distance = 1.2
+    server.client.flush()
+    page.wait_for_function(
+        "() => __viserMutable.cameraControl.minDistance === 1.2", timeout=PATIENCE
+    )
+    page.evaluate("document.activeElement.blur()")
+    before = server.cameras
+    page.keyboard.press("w", delay=100)
+    page.mouse.move(200, 200)
+    page.mouse.wheel(0, -500)
+    page.wait_for_timeout(200)
+    assert page.evaluate("__viserMutable.camera.position.length()") == pytest.approx(1.2, abs=1e-6)
+    page.keyboard.press("ArrowRight", delay=100)
+    assert until(lambda: server.cameras > before)
+    camera.min_orbit_distance, camera.max_orbit_distance = 0.01, 1e4
+    camera.position, camera.look_at = (0, 0, 1.2), (0, 0, 0)
 
 
 def test_thumbs_are_large_enough_for_a_finger(page: Page) -> None:
@@ -243,6 +278,28 @@ def test_vertex_colours_are_those_of_the_legend(server: Tiny, page: Page) -> Non
     assert until(
         lambda: abs(page.evaluate(PIXEL)[0] - 200) < 40
     )  # its own colour again, through viser's curve
+
+
+def test_colours_come_while_the_panel_is_folded(server: Tiny, page: Page) -> None:
+    vertices, faces = patch(SIDE // 2)
+    mesh = server.client.scene.add_mesh_simple(
+        "/over/mesh", vertices * 0.2, faces, position=(0, 0, 0.1), side="double"
+    )
+    server.client.gui.main_panel.minimize()
+    colour = (90, 20, 200)
+    clouds = guard.add_colours(
+        server.client.scene, "/over", np.tile(np.array(colour, np.uint8), (SIDE * SIDE, 1))
+    )
+    assert seen(page, colour)
+    colour = (9, 200, 20)
+    with server.client.atomic():
+        mesh.vertices = vertices * 0.3
+        clouds.colors = np.tile(np.array(colour, np.uint8), (SIDE * SIDE, 1))
+    assert seen(page, colour)
+    clouds.remove()
+    assert until(lambda: not page.evaluate(f"() => ({MESH})('/over/mesh').material.vertexColors"))
+    mesh.remove()
+    server.client.gui.main_panel.expand()
 
 
 def test_vertex_colours_stay_whatever_happens_to_the_mesh(server: Tiny, page: Page) -> None:

@@ -1,0 +1,386 @@
+"""The page in Chromium, as a person uses it: what is read comes from the page, pictures are kept to be looked at."""
+
+from __future__ import annotations
+
+import math
+import re
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser
+from playwright.sync_api import Page as Tab
+
+from faceambig_app import pipeline, server
+
+pytestmark = pytest.mark.browser
+
+ARTEFACTS = Path(__file__).resolve().parents[2] / "artefacts"
+PATIENCE = 20_000  # milliseconds until something is seen: other tests share the processors
+MESH = """name => { let found; window.__viserMutable?.nodeRefFromName[name]?.traverse(o => {
+  if (!found && o.isMesh) found = o }); return found ? Array.from(found.geometry.attributes.position.array) : null }"""
+CAMERA = """() => { const c = __viserMutable.camera; c.updateMatrixWorld();
+  return { position: c.position.toArray(), matrix: c.matrixWorld.elements.slice(), fov: c.fov, aspect: c.aspect } }"""
+PLACE = """name => { const n = __viserMutable.nodeRefFromName[name]; n.updateWorldMatrix(true, false);
+  return [n.matrixWorld.elements[12], n.matrixWorld.elements[13], n.matrixWorld.elements[14]] }"""
+
+
+@pytest.fixture(scope="module")
+def served() -> Iterator[server.Page]:
+    page = server.Page("127.0.0.1", 0)
+    yield page
+    page.close()
+
+
+class Visitor:
+    """A person with a browser."""
+
+    def __init__(self, tab: Tab) -> None:
+        self.tab = tab
+        tab.wait_for_selector(".fa-cards", timeout=PATIENCE)
+        tab.wait_for_selector(".fa-plot", timeout=PATIENCE)
+        tab.wait_for_function(f"() => ({MESH})('/fit/head') !== null", timeout=PATIENCE)
+        self.rest()
+
+    def mesh(self, name: str) -> np.ndarray:
+        """(V, 3) positions the page has on its graphics card."""
+        return np.array(self.tab.evaluate(MESH, name)).reshape(-1, 3)
+
+    def numbers(self) -> tuple[float, float]:
+        """d_L in percent and d_S in millimetres, as read on the cards."""
+        texts = self.tab.locator(".fa-card span").all_inner_texts()
+        d_l, d_s = (float(re.sub(r"[^0-9.]", "", text)) for text in texts[:2])
+        return d_l, d_s
+
+    def slider(self, name: str) -> Any:
+        return self.tab.get_by_role("slider", name=name, exact=True)
+
+    def centimetres(self) -> float:
+        return float(self.tab.get_by_label("Distance (cm)").input_value())
+
+    def type_distance(self, text: str) -> None:
+        box = self.tab.get_by_label("Distance (cm)")
+        box.fill(text)
+        box.press("Tab")
+
+    def until(self, what: Callable[[], bool], words: str) -> None:
+        end = time.monotonic() + PATIENCE / 1000
+        while not what():
+            assert time.monotonic() < end, words
+            self.tab.wait_for_timeout(50)
+
+    def rest(self) -> None:
+        """Until the full face has not changed for half a second."""
+        last, since = None, time.monotonic()
+        end = since + PATIENCE / 1000
+        while time.monotonic() - since < 0.5:
+            assert time.monotonic() < end, "the face does not come to rest"
+            now = (
+                self.tab.inner_text(".fa-cards"),
+                round(float(np.abs(self.mesh("/fit/head")).sum()), 6),
+            )
+            if now != last:
+                last, since = now, time.monotonic()
+            self.tab.wait_for_timeout(80)
+
+
+@pytest.fixture
+def visit(served: server.Page, page_url: Callable[..., Tab]) -> Callable[..., Visitor]:
+    def go(width: int = 1200, height: int = 700) -> Visitor:
+        return Visitor(page_url(f"{served.address}?fixedDpr=0.4", width, height))
+
+    return go
+
+
+def test_the_first_frame_teaches(visit):
+    me = visit()
+    assert (
+        len(me.mesh("/true/head"))
+        == len(me.mesh("/fit/head"))
+        == pipeline.model("embedded").n_vertices
+    )
+    assert np.abs(me.mesh("/true/head") - me.mesh("/fit/head")).max() > 1e-3  # another face
+    d_l, d_s = me.numbers()
+    assert d_l < 1.5
+    assert d_s > 2
+    assert me.tab.title() == "faceambig"
+    text = me.tab.inner_text("body")
+    for words in ("Same picture, different face", "30", "1.2", "taken from"):
+        assert words in text
+    # as many crosses as circles as landmarks: two strokes, or one round, a point
+    assert me.tab.locator("#fx").get_attribute("d").count("M") == 68
+    assert me.tab.locator("#fo").get_attribute("d").count("M") == 68
+
+
+def test_arrow_keys_move_the_slider_and_the_face_but_not_the_camera(visit):
+    me = visit()
+    true, fit, camera = me.mesh("/true/head"), me.mesh("/fit/head"), me.tab.evaluate(CAMERA)
+    slider, before = me.slider("Assumed distance"), me.centimetres()
+    slider.focus()
+    for _ in range(4):
+        me.tab.keyboard.press("ArrowLeft")
+        me.tab.wait_for_timeout(70)
+    me.until(lambda: me.centimetres() < before, "the number did not follow the slider")
+    me.rest()
+    assert me.centimetres() == pytest.approx(before * 2 ** (-4 / 24), rel=0.01)
+    assert np.abs(me.mesh("/fit/head") - fit).max() > 1e-4
+    assert np.abs(me.mesh("/true/head") - true).max() == 0
+    assert me.tab.evaluate(CAMERA) == camera
+    assert slider.get_attribute("aria-valuetext").startswith("1.0")
+
+
+def test_the_mouse_drags_the_slider_and_the_circles_stay_on_the_crosses(visit):
+    me = visit()
+    fit = me.mesh("/fit/head")
+    box = me.slider("Assumed distance").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    me.tab.mouse.move(x, y)
+    me.tab.mouse.down()
+    for step in range(12):
+        me.tab.mouse.move(x - 6 * step, y)
+        me.tab.wait_for_timeout(30)
+    me.tab.mouse.up()
+    me.until(lambda: me.centimetres() < 110, "the drag did not arrive")
+    me.rest()
+    assert np.abs(me.mesh("/fit/head") - fit).max() > 1e-4
+    assert me.numbers()[0] < 1.5
+
+
+def test_the_points_stay_while_the_face_changes_for_the_mean_of_ten_people(visit):
+    me = visit()
+    near, far = [], []
+    for person in pipeline.model("embedded").subjects:
+        me.tab.get_by_label("Person").click()
+        me.tab.get_by_role("option", name=person.name, exact=True).click()
+        for centimetres, into in (("30", near), ("240", far)):
+            me.type_distance(centimetres)
+            me.rest()
+            into.append(me.numbers())
+    d_l, d_s = np.mean(far, axis=0)
+    assert d_l < 1.5  # HEAD.md 7 of the design; measured 1.08
+    assert d_s >= 1.5 * np.mean(near, axis=0)[1]  # measured 1.9 times
+
+
+def test_two_browsers_do_not_influence_each_other(visit):
+    me, you = visit(), visit(700, 500)
+    mine, yours = me.mesh("/fit/head"), you.mesh("/fit/head")
+    me.type_distance("45")
+    me.until(lambda: np.abs(me.mesh("/fit/head") - mine).max() > 1e-4, "my face did not change")
+    me.rest()
+    assert np.abs(you.mesh("/fit/head") - yours).max() == 0
+    assert you.centimetres() == 120
+
+
+def test_two_controls_changed_at_once_both_count(visit):
+    me = visit()
+    for attempt in range(8):
+        before = me.centimetres()
+        for name in ("Assumed distance", "Photo taken from"):  # nothing waits between the two
+            me.slider(name).focus()
+            me.tab.keyboard.press("ArrowRight" if attempt % 2 else "ArrowLeft")
+        me.until(lambda b=before: me.centimetres() != b, "the first control was lost")
+        me.rest()
+        taken = me.tab.inner_text(".fa-photo em")
+        step = int(me.slider("Photo taken from").get_attribute("aria-valuenow"))
+        metres = 0.2 * 2 ** (step / 24)
+        assert f"{100 * metres:.3g}" in taken, (
+            attempt,
+            taken,
+        )  # the server has what the slider shows
+
+
+@pytest.mark.parametrize(("typed", "stands"), [("5", "20"), ("9999", "300")])
+def test_a_number_out_of_range_is_said_and_set_to_the_nearest(visit, typed, stands):
+    me = visit()
+    me.type_distance(typed)
+    notice = me.tab.get_by_text(re.compile(rf"is outside 20 to 300\. Set to {stands}\."))
+    notice.first.wait_for(timeout=PATIENCE)
+    me.until(lambda: me.centimetres() == float(stands), "the nearest value was not set")
+    me.rest()
+    assert me.numbers()[0] < 3
+
+
+def test_letters_and_emptiness_leave_the_last_face(visit):
+    me = visit()
+    fit = me.mesh("/fit/head")
+    box = me.tab.get_by_label("Distance (cm)")
+    box.press_sequentially("abc")
+    box.fill("")
+    box.press("Tab")
+    me.tab.wait_for_timeout(1500)
+    assert np.abs(me.mesh("/fit/head") - fit).max() == 0
+
+
+def test_an_error_is_a_red_line_and_the_last_face_stays(visit, monkeypatch):
+    me = visit()
+    fit = me.mesh("/fit/head")
+    real = server.frame
+
+    def fails(state, **options):
+        if abs(state.distance - 0.66) < 1e-9:
+            raise RuntimeError("a planted error")
+        return real(state, **options)
+
+    monkeypatch.setattr(server, "frame", fails)
+    me.type_distance("66")
+    me.tab.get_by_text("a planted error").first.wait_for(timeout=PATIENCE)
+    assert np.abs(me.mesh("/fit/head") - fit).max() == 0
+    me.type_distance("67")
+    me.until(lambda: np.abs(me.mesh("/fit/head") - fit).max() > 1e-4, "the page did not go on")
+
+
+def test_both_heads_stay_side_by_side_while_the_viewer_goes_round(visit):
+    me = visit()
+    canvas = me.tab.locator("canvas[data-engine]").bounding_box()
+    x, y = canvas["x"] + canvas["width"] / 2, canvas["y"] + canvas["height"] / 2
+    for turn in range(3):
+        me.tab.mouse.move(x, y)
+        me.tab.mouse.down()
+        me.tab.mouse.move(x + 90 + 40 * turn, y + 10, steps=6)
+        me.tab.mouse.up()
+        me.tab.wait_for_timeout(600)
+        camera = me.tab.evaluate(CAMERA)
+        right = np.array(camera["matrix"][:3])
+        gap = np.array(me.tab.evaluate(PLACE, "/fit")) - np.array(me.tab.evaluate(PLACE, "/true"))
+        assert gap @ right / np.linalg.norm(gap) > 0.999, (
+            turn
+        )  # along the viewer's right, to 2.5 degrees
+
+
+def test_the_wheel_does_not_change_perspective(visit):
+    me = visit()
+    canvas = me.tab.locator("canvas[data-engine]").bounding_box()
+    me.tab.mouse.move(canvas["x"] + canvas["width"] / 2, canvas["y"] + canvas["height"] / 2)
+    for _ in range(5):
+        me.tab.mouse.wheel(0, -300)
+        me.tab.wait_for_timeout(100)
+    me.tab.wait_for_timeout(500)
+    distance = np.linalg.norm(me.tab.evaluate(CAMERA)["position"])
+    assert distance == pytest.approx(20, rel=0.01)  # metres: a long lens
+
+
+def test_view_buttons_say_which_is_on_and_turn_the_heads(visit):
+    me = visit()
+    for name, forward in (("Front", 0.0), ("Side", 90.0), ("3/4", 32.0)):
+        button = me.tab.get_by_role("button", name=name, exact=True)
+        button.click()
+        me.until(
+            lambda b=button: b.get_attribute("aria-pressed") == "true", f"{name} is not shown as on"
+        )
+        me.tab.wait_for_timeout(600)
+        back = np.array(me.tab.evaluate(CAMERA)["matrix"][8:11])
+        # model +z is the page's own front: the angle between it and the viewer, elevation aside
+        head = np.array(me.tab.evaluate(PLACE, "/true")) - np.array(me.tab.evaluate(PLACE, "/fit"))
+        assert abs(back @ head) < 1e-2 * np.linalg.norm(head)
+        assert forward >= 0
+
+
+def test_through_the_camera_the_eyes_keep_their_distance(visit):
+    me = visit()
+    me.tab.get_by_role("button", name="Through camera").click()
+    corners = pipeline.model("embedded").scheme("ibug68").vertices[[36, 39, 42, 45]]
+    gaps = []
+    for centimetres in ("30", "60", "120", "240"):
+        me.type_distance(centimetres)
+        me.rest()
+        me.tab.wait_for_timeout(400)
+        points = me.mesh("/fit/head")[corners]  # world axes, camera at the origin looking along -z
+        pixels = (
+            points[:, :2]
+            / -points[:, 2:]
+            / math.tan(math.radians(me.tab.evaluate(CAMERA)["fov"]) / 2)
+        )
+        eyes = pixels[:2].mean(axis=0), pixels[2:].mean(axis=0)
+        gaps.append(np.linalg.norm(eyes[1] - eyes[0]))
+    assert max(gaps) / min(gaps) < 1.01  # UX.md 6.8 of the design
+
+
+def test_the_first_mode_bends_the_face_and_says_what_moves(visit):
+    me = visit()
+    fit, before = me.mesh("/fit/head"), me.numbers()
+    me.tab.get_by_text("Other faces behind the same points").click()
+    slider = me.slider("Mode A (mm)")
+    slider.wait_for(timeout=PATIENCE)
+    slider.focus()
+    for _ in range(2):
+        me.tab.keyboard.press("ArrowRight")
+        me.tab.wait_for_timeout(80)
+    me.until(
+        lambda: np.abs(me.mesh("/fit/head") - fit).max() > 1e-4, "the mode did not bend the face"
+    )
+    me.rest()
+    assert abs(me.numbers()[0] - before[0]) < 0.1  # 1 mm of surface; the points hardly move
+    assert "Mode A:" in me.tab.inner_text("body")
+    me.tab.get_by_role("button", name="Zero").click()
+    me.until(
+        lambda: np.abs(me.mesh("/fit/head") - fit).max() < 1e-6, "Zero did not bring the face back"
+    )
+
+
+def test_turning_the_head_changes_the_photograph(visit):
+    me = visit()
+    picture = me.tab.evaluate(
+        "() => getComputedStyle(document.querySelector('.fa-photo')).backgroundImage"
+    )
+    me.tab.get_by_text("Pose of the head in the photo").click()
+    slider = me.slider("Turn")
+    slider.wait_for(timeout=PATIENCE)
+    slider.focus()
+    for _ in range(10):
+        me.tab.keyboard.press("ArrowRight")
+        me.tab.wait_for_timeout(60)
+    me.until(
+        lambda: (
+            me.tab.evaluate(
+                "() => getComputedStyle(document.querySelector('.fa-photo')).backgroundImage"
+            )
+            != picture
+        ),
+        "the photograph stayed",
+    )
+    me.rest()
+    assert me.numbers()[0] < 1.5
+
+
+@pytest.mark.parametrize(
+    ("name", "width", "height", "scheme"),
+    [
+        ("desktop", 1440, 900, "light"),
+        ("desktop_dark", 1440, 900, "dark"),
+        ("phone", 390, 844, "light"),
+        ("phone_small", 360, 740, "dark"),
+        ("tablet", 820, 1180, "light"),
+    ],
+)
+def test_pictures_of_the_page_are_kept(browser: Browser, served, name, width, height, scheme):
+    context = browser.new_context(viewport={"width": width, "height": height}, color_scheme=scheme)
+    tab = context.new_page()
+    tab.goto(f"{served.address}?fixedDpr=1")
+    me = Visitor(tab)
+    tab.add_style_tag(content=".mantine-Notifications-root { display: none }")
+    tab.wait_for_timeout(800)
+    ARTEFACTS.mkdir(exist_ok=True)
+    file = ARTEFACTS / f"page_{name}.png"
+    tab.screenshot(path=file)
+    assert tab.evaluate(
+        "() => document.documentElement.scrollWidth <= innerWidth"
+    )  # nothing sideways
+    dark = tab.evaluate("() => document.documentElement.dataset.mantineColorScheme")
+    assert dark == scheme
+    assert me.numbers()[0] < 1.5
+    import cv2
+
+    picture = cv2.imread(str(file))
+    assert picture.shape[:2] == (height, width)
+    # two heads in the scene: pixels of skin, redder than blue by far, on both halves of the canvas
+    canvas = tab.locator("canvas[data-engine]").bounding_box()
+    x0, x1 = int(canvas["x"]), int(canvas["x"] + canvas["width"])
+    scene = picture[: int(0.38 * height) if width < 577 else height, x0:x1].astype(int)
+    skin = scene[:, :, 2] > scene[:, :, 0] + 25
+    left, right = skin[:, : skin.shape[1] // 2].mean(), skin[:, skin.shape[1] // 2 :].mean()
+    assert left > 0.05
+    assert right > 0.05
+    context.close()
