@@ -115,9 +115,11 @@ def _card(tone: str, title: str, value: str, unit: str, note: str, hint: str) ->
 
 def spoken(numbers: Numbers) -> str:
     """The result as one sentence for a screen reader; changes once a rest."""
-    sentence = (
-        f"{say('field.distance')} {distance_text(numbers.distance)}. {say('number.d_l')} "
-        f"{percent_number(numbers.d_l_percent)} percent. {say('number.d_s')} {numbers.d_s_mm:.1f} millimetres."
+    sentence = say(
+        "number.spoken",
+        distance=distance_text(numbers.distance),
+        d_l=percent_number(numbers.d_l_percent),
+        d_s=f"{numbers.d_s_mm:.1f}",
     )
     return f'<div class="fa-hidden" aria-live="polite">{escape(sentence)}</div>'
 

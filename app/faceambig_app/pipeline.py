@@ -276,7 +276,7 @@ def picture(target: Target) -> Photo:
 
 
 def _taken(target: Target) -> str:
-    return f"photo {say('app.taken', distance=centimetres(target.actual))}"
+    return say("head.taken", distance=centimetres(target.actual))
 
 
 def _note(taken: Photograph, target: Target) -> str:

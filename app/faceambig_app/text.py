@@ -45,6 +45,7 @@ def centimetres(metres: float | None) -> str:
 
 def percent_number(value: float) -> str:
     """d_L: two decimals below 1, one above; never minus zero."""
+    value = abs(value)
     return f"{value:.2f}" if value < 0.995 else f"{value:.1f}"
 
 
