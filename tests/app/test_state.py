@@ -145,8 +145,8 @@ def test_what_is_no_number_in_range_is_refused_in_one_short_line(field, bad):
 
 def test_a_whole_number_is_not_a_fraction():
     with pytest.raises(ValueError, match=r"^subject: 1\.5 is not a whole number$"):
-        ViewState(subject=1.5)
-    assert ViewState(distance=1).distance == 1
+        changed(DEFAULT, subject=1.5)
+    assert changed(DEFAULT, distance=1).distance == 1
 
 
 @pytest.mark.parametrize("field", WORDS, ids=lambda field: field.name)
