@@ -15,7 +15,7 @@ LOCKED = $(INSTALL) --no-deps --require-hashes -r
 export OPENBLAS_NUM_THREADS = 1
 export OMP_NUM_THREADS = 1
 
-.PHONY: demo test check fix lock head clean for-demo for-test
+.PHONY: demo test check fix bench golden lock head clean for-demo for-test
 .NOTPARALLEL:
 
 demo: for-demo .venv/.app
@@ -33,6 +33,14 @@ check: .venv/.dev
 fix: .venv/.dev
 	.venv/bin/ruff check --fix
 	.venv/bin/ruff format
+
+bench: .venv/.dev
+	@for script in benchmarks/*.py; do echo "== $$script"; .venv/bin/python $$script || exit 1; done
+
+# Stores the pictures of the tests anew: look at each one that changed before it is committed.
+golden: for-test .venv/.dev
+	GOLDEN=write .venv/bin/python -m pytest -k like_the_stored
+	git status --short tests/golden
 
 # Needs uv. Keeps the versions in the locks; UPGRADE=--upgrade takes the newest that pyproject.toml allows.
 # Universal and of few forks: one version of each package on every Python and system.
