@@ -42,9 +42,9 @@ LARGEST = 12_000_000  # pixels of one frame buffer; 4 samples each with depth ar
 # Direction towards the light in viewer axes (x right, y up, z to the viewer), colour, intensity: the key from above
 # left is two lamps a little apart, which softens its edge as a wide window does.
 LIGHTS = (
-    ((-0.72, 0.62, 0.42), (1.00, 0.95, 0.89), 2.05),
-    ((-0.34, 0.56, 0.76), (1.00, 0.96, 0.91), 1.95),
-    ((0.88, 0.02, 0.50), (0.90, 0.94, 1.00), 0.95),
+    ((-0.66, 0.62, 0.46), (1.00, 0.95, 0.89), 1.95),
+    ((-0.12, 0.50, 0.86), (1.00, 0.96, 0.91), 1.75),
+    ((0.88, 0.02, 0.50), (0.96, 0.97, 1.00), 1.05),
     ((0.72, 0.38, -0.58), (1.00, 1.00, 1.00), 2.2),
 )
 AMBIENT = (0.135, 0.125, 0.12)
@@ -52,7 +52,10 @@ ROUGHNESS = 0.62
 SHEEN, SHEEN_WIDTH = 0.075, 16  # highlight on skin: strength, and the power that narrows it
 INSIDE = 0.42  # sRGB grey of back faces: a cut surface, never a look into the empty head
 
-BEAD, BEAD_COLOUR = 0.0013, (0x1B, 0x5F, 0xC1)  # metres, sRGB: a landmark on a head
+BEAD, BEAD_COLOUR = (
+    0.0055,
+    (0x1B, 0x5F, 0xC1),
+)  # radius over the picture's height, sRGB: a landmark on a head
 
 
 class NoRendererError(RuntimeError):
@@ -121,7 +124,7 @@ def render_head(
     colours = _lit_colours(head, normals) if head.lit else _shown_colours(head, normals)
     mesh = Mesh(points, normals, head.faces, colours, head.lit)
     if marked is not None and len(marked):
-        mesh = _with_beads(mesh, points[marked])
+        mesh = _with_beads(mesh, points[marked], BEAD * height / pixels_per_metre)
     factor = 2 if 4 * width * height <= LARGEST else 1
     size = (factor * width, factor * height)
     half = (width / (2 * pixels_per_metre), height / (2 * pixels_per_metre))
@@ -160,8 +163,8 @@ def _shown_colours(head: Head, normals: Array) -> Array:
     return head.colours / 255.0 * shade[:, None]
 
 
-def _with_beads(mesh: Mesh, at: Array) -> Mesh:
-    """The mesh with a small ball at each of `at` (M, 3): hidden where the face hides it."""
+def _with_beads(mesh: Mesh, at: Array, radius: float) -> Mesh:
+    """The mesh with a ball of `radius` metres at each of `at` (M, 3): hidden where the face hides it."""
     import trimesh
 
     ball = trimesh.creation.icosphere(subdivisions=1, radius=1.0)
@@ -171,7 +174,7 @@ def _with_beads(mesh: Mesh, at: Array) -> Mesh:
     colour = np.array(BEAD_COLOUR) / 255.0
     shown = srgb_to_linear(colour) if mesh.lit else colour
     return Mesh(
-        np.concatenate([mesh.points, (at[:, None] + BEAD * shape).reshape(-1, 3)]),
+        np.concatenate([mesh.points, (at[:, None] + radius * shape).reshape(-1, 3)]),
         np.concatenate([mesh.normals, np.tile(shape, (len(at), 1))]),
         np.concatenate([mesh.faces, triangles]),
         np.concatenate([mesh.colours, np.tile(shown, (len(at) * len(shape), 1))]),
