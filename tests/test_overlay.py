@@ -237,15 +237,15 @@ def test_a_picture_has_the_same_bytes_twice():
 
 @draws
 def test_heads_have_the_scale_of_the_bar():
-    # A sheet of one metre's hundredths: the head's width in pixels over the bar's is its width in metres over 5 cm.
     scene = scenes.scene(view=scenes.FRONT, curves=None)
-    picture = overlay.draw(scene)[..., :3].astype(int)
-    skin = (picture[..., 0] - picture[..., 2] > 30)[:, 372:1068]
-    left_head = np.flatnonzero(skin[:, :348].any(axis=0))
-    dark = (np.abs(picture - plots.INK).max(axis=2) < 12)[620:, 372:700]
-    bar = max((np.flatnonzero(row) for row in dark), key=len)
+    picture = overlay.draw(scene, transparent=True)
+    opaque = picture[..., 3] > 127
+    head = np.flatnonzero(opaque[300:600, 380:720].any(axis=0))  # the left one, right of the panel
+    level = int(np.argmax(opaque[620:, 380:720].sum(axis=1)))
+    bar = np.flatnonzero(opaque[620 + level, 380:720])
     wide = np.ptp(scene.heads[0].vertices[:, 0])
-    assert np.ptp(left_head) / np.ptp(bar) == pytest.approx(wide / scene.scale_bar, rel=0.02)
+    # half a pixel at each of four ends of 70 and 210 pixels
+    assert np.ptp(head) / np.ptp(bar) == pytest.approx(wide / scene.scale_bar, rel=0.02)
 
 
 @draws
