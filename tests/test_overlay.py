@@ -25,7 +25,7 @@ def _renderer(request):
 
 @pytest.fixture
 def canvases(monkeypatch):
-    """Every canvas that is drawn on; heads are left out, so that no OpenGL is needed."""
+    """Every canvas that is drawn on; heads and photographs are left blank: no OpenGL is needed, and it is quick."""
     made = []
 
     class Kept(Canvas):
@@ -36,7 +36,11 @@ def canvases(monkeypatch):
     def nothing(head, view, width, height, pixels_per_metre, **options):
         return np.zeros((height, width, 4), dtype=np.uint8)
 
+    def blank(vertices, photo, focal, size, **options):
+        return np.full((size[1], size[0], 3), 200, dtype=np.uint8)
+
     monkeypatch.setattr(overlay, "Canvas", Kept)
+    monkeypatch.setattr(overlay.painter, "paint", blank)
     monkeypatch.setattr(overlay.gl, "render_head", nothing)
     return made
 
