@@ -11,12 +11,15 @@ from __future__ import annotations
 
 import heapq
 import itertools
+import logging
 import threading
 import time
 from collections.abc import Callable
 from typing import Any, Protocol
 
 from .state import ViewState, changed
+
+log = logging.getLogger("faceambig")
 
 REST = 0.2  # seconds without a change before the full mesh is drawn
 WORKERS = 2  # measured: one was not better than two, and Python holds the interpreter's lock beyond
@@ -42,7 +45,7 @@ class Room:
         self.left = False
         self._painter, self._ring = painter, ring
         self._changed_at = 0.0  # monotonic seconds
-        self._resting: ViewState | None = None  # the state that was last drawn in full
+        self._drawn: tuple[float, bool] | None = None  # the change drawn last; whether as a draft
 
     def hear(self, values: dict[str, Any]) -> None:
         """Take a change of some fields, already in range. On the event loop only: one writer, in message order."""
@@ -64,19 +67,18 @@ class Room:
         """Draw the newest state; a draft if it is young, with a full turn booked for when it has rested."""
         if self.left:
             return
-        state = self.state
-        wait = self._changed_at + REST - time.monotonic()
+        at, state = self._changed_at, self.state  # in this order: go() sets the state first
+        wait = at + REST - time.monotonic()
         draft = wait > 0
-        if not draft and state == self._resting:
-            return
-        try:
-            self._painter.draw(state, draft)
-        except Exception as error:  # noqa: BLE001 - a fit may fail in any way; worker and last frame must survive
-            if not self.left:
-                self._painter.refuse(error)
-            draft = False
-        self._resting = None if draft else state
-        if draft:
+        if self._drawn not in ((at, draft), (at, False)):
+            try:
+                self._painter.draw(state, draft)
+                self._drawn = (at, draft)
+            except Exception as error:  # noqa: BLE001 - a fit may fail in any way; worker and last frame must survive
+                self._drawn = (at, False)  # it would fail again
+                if not self.left:
+                    self._painter.refuse(error)
+        if self._drawn == (at, True):
             self._ring(self, wait)
 
 
@@ -132,6 +134,8 @@ class Dispatcher:
                 self._served.add(room)
             try:
                 self._serve(room)
+            except Exception:  # perhaps its browser has just gone; the others need this worker
+                log.exception("a room could not be served")
             finally:
                 with self._changed:
                     self._served.discard(room)
