@@ -315,7 +315,10 @@ _OUR_SENDER = (
     "function cancel(){if(timer!==null)clearTimeout(timer);timer=null;flush()}"
     "return{send,flush,cancel}}"
 )
-PATCHES = ((_SENDER, _OUR_SENDER),)
+# The canvas is told in device pixels, three to a pixel of the page on a phone; the page's own decide the layout.
+_CANVAS = "image_height:o.height,image_width:o.width,fov:"
+_OUR_CANVAS = "image_height:o.clientHeight,image_width:o.clientWidth,fov:"
+PATCHES = ((_SENDER, _OUR_SENDER), (_CANVAS, _OUR_CANVAS))
 _PACKED = re.compile(
     r'<script data-p="([^"]*)" data-ss="(\d+)" data-cs="(\d+)">(.*?)</script>', re.DOTALL
 )
@@ -595,6 +598,7 @@ async def _update(api: Any, client_id: Any, message: Any) -> None:
     asked = message.updates["value"]
     put, why = _nearest(control, asked)
     if why == "":
+        message.updates["value"] = put
         await _real_update(api, client_id, message)
         # Leaving the field, the browser puts the nearest value itself; a longer or shorter one is still typing.
         if before is not None and put == before.put and not _typing(before.asked, put):
@@ -669,7 +673,8 @@ def _nearest(control: Any, asked: Any) -> tuple[Any, str]:
         if not _number(asked, -math.inf, math.inf) or math.isinf(asked):
             return value, "kind"
         put = _clamped(asked, props.min, props.max, whole=isinstance(value, int))
-        return put, "" if put == asked else "range"
+        # The browser counts steps in doubles: a hair beyond the end is the end
+        return put, "" if math.isclose(put, asked, rel_tol=1e-9, abs_tol=1e-9) else "range"
     if isinstance(value, tuple) and not isinstance(control, _gui_handles.GuiUploadButtonHandle):
         return (tuple(asked), "") if _tuple_allowed(control, asked) else (value, "kind")
     return value, "kind"

@@ -415,6 +415,8 @@ def test_right_values_are_taken(tiny: Tiny) -> None:
             put = tuple(value) if isinstance(value, list) else value
             assert until(lambda name=name, put=put: controls[name].value == put), (name, value)
             assert type(controls["steps"].value) is int
+        browser.set(controls["slider"], math.nextafter(300.0, math.inf))  # steps counted in doubles
+        assert until(lambda: controls["slider"].value == 300.0, 0.5)
     assert not tiny.refused
 
 
