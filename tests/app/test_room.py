@@ -100,7 +100,7 @@ def test_rings_while_waiting_are_one_turn_and_rings_while_served_another(dispatc
     dispatcher = dispatchers(serve, workers=1)
     dispatcher.ring("a")
     assert started.wait(SOON)
-    for name in "abab":
+    for name in "abba":
         dispatcher.ring(name)
     go.set()
     until(lambda: len(turns) == 3)

@@ -1,0 +1,268 @@
+"""pipeline: a frame is a function of its state alone; the look never refits; the ambiguity is there to be seen."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import faceambig as fa
+from faceambig.flex import plausible_limit
+from faceambig_app import pipeline
+from faceambig_app.pipeline import curve_key, curve_of, frame
+from faceambig_app.state import DEFAULT, FIELDS, Field, ViewState, changed
+
+CACHED = [value for value in vars(pipeline).values() if hasattr(value, "cache_clear")]
+
+
+def values(field: Field) -> st.SearchStrategy:
+    if field.kind is str:
+        return st.sampled_from(field.choices)
+    if field.kind is int:
+        return st.integers(int(field.low), int(field.high))
+    return st.sampled_from([field.low, field.high]) | st.floats(field.low, field.high)
+
+
+states = st.fixed_dictionaries({name: values(field) for name, field in FIELDS.items()}).map(
+    lambda chosen: ViewState(**chosen)
+)
+
+
+def forget() -> None:
+    for function in CACHED:
+        if function is not pipeline.model:  # loading a model is no step of a state
+            function.cache_clear()
+
+
+@pytest.fixture
+def counted(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, int]]:
+    """How often the library is really asked."""
+    forget()
+    counts = {"observe": 0, "fit": 0, "flexibility_modes": 0, "sweep_distance": 0}
+
+    def count(name: str) -> Any:
+        real = getattr(fa, name)
+
+        def counting(*arguments: Any, **options: Any) -> Any:
+            counts[name] += 1
+            return real(*arguments, **options)
+
+        return counting
+
+    for name in counts:
+        monkeypatch.setattr(pipeline.fa, name, count(name))
+    yield counts
+    forget()
+
+
+def everything(shown: pipeline.Frame) -> list[np.ndarray]:
+    """The numbers of a frame: surfaces, points, colours, curves."""
+    scene = shown.scene
+    arrays = [array for head in scene.heads for array in (head.vertices, head.colours)]
+    arrays += [scene.photo.vertices, scene.photo.observed, scene.photo.projected]
+    n = scene.numbers
+    arrays.append(np.array([n.distance or np.inf, n.d_l_percent, n.d_s_mm, n.flex_mm]))
+    if scene.curves is not None:
+        arrays += [scene.curves.d_l_percent, scene.curves.d_s_mm]
+    return [np.asarray(array, dtype=float) for array in (*arrays, shown.flex_reach)]
+
+
+JOURNEY = [
+    changed(DEFAULT, distance=0.3),
+    changed(DEFAULT, distance=2.8),
+    changed(DEFAULT, distance=1.0, flex=4.0),
+    changed(DEFAULT, distance=1.0, flex=-4.0, surface="difference"),
+    changed(DEFAULT, camera="orthographic", view="camera"),
+    changed(DEFAULT, yaw=40.0, noise=2.0, seed=7, subject=4),
+    changed(DEFAULT, actual=2.0, scheme="farkas", prior=0.1),
+    changed(DEFAULT, show="row"),
+]
+
+
+def test_a_frame_does_not_depend_on_the_way_to_its_state():
+    forget()
+    first = [everything(frame(state)) for state in JOURNEY]
+    for seed in range(2):
+        forget()
+        order = random.Random(seed).sample(range(len(JOURNEY)), len(JOURNEY))
+        if seed:  # a hand on its way there: drafts of states between
+            for metres in np.linspace(0.2, 3.0, 15):
+                frame(changed(DEFAULT, distance=float(metres)), with_curves=False)
+        for index in order:
+            for ours, before in zip(everything(frame(JOURNEY[index])), first[index], strict=True):
+                # the same steps from the same start: only BLAS threads could sum in another order
+                assert np.allclose(ours, before, rtol=1e-9, atol=1e-9)
+
+
+def test_the_same_state_is_the_same_frame_without_new_work(counted):
+    once = frame(DEFAULT)
+    before = dict(counted)
+    again = frame(changed(DEFAULT))
+    assert counted == before
+    for a, b in zip(everything(once), everything(again), strict=True):
+        assert np.array_equal(a, b)
+    assert again.scene.heads[1].vertices is once.scene.heads[1].vertices
+
+
+@settings(max_examples=25)
+@given(states)
+def test_every_state_there_is_can_be_shown(state):
+    shown = frame(state, with_curves=False)
+    assert shown.state == state
+    assert len(shown.scene.heads) == (5 if state.show == "row" else 2)
+    assert all(np.isfinite(head.vertices).all() for head in shown.scene.heads)
+    assert shown.scene.numbers.converged
+    assert np.isfinite(shown.scene.numbers.d_s_mm)
+
+
+def test_moving_the_look_never_refits(counted):
+    frame(DEFAULT)
+    assert counted == {"observe": 1, "fit": 1, "flexibility_modes": 1, "sweep_distance": 1}
+    for view in FIELDS["view"].choices:
+        for surface in FIELDS["surface"].choices:
+            frame(changed(DEFAULT, view=view, surface=surface))
+    assert counted == {"observe": 1, "fit": 1, "flexibility_modes": 1, "sweep_distance": 1}
+
+
+def test_each_change_costs_only_its_own_steps(counted):
+    frame(DEFAULT)
+    frame(changed(DEFAULT, flex=2.0))
+    assert counted == {"observe": 1, "fit": 1, "flexibility_modes": 1, "sweep_distance": 1}
+    frame(changed(DEFAULT, distance=0.5), with_curves=False)
+    assert counted == {"observe": 1, "fit": 2, "flexibility_modes": 1, "sweep_distance": 1}
+    frame(changed(DEFAULT, distance=0.5))  # in full: the same curves, new modes
+    assert counted == {"observe": 1, "fit": 2, "flexibility_modes": 2, "sweep_distance": 1}
+    frame(changed(DEFAULT, yaw=10.0), with_curves=False)
+    assert counted == {"observe": 2, "fit": 3, "flexibility_modes": 2, "sweep_distance": 1}
+
+
+def test_a_draft_has_no_curves_and_the_same_heads():
+    draft, full = (frame(DEFAULT, with_curves=curves) for curves in (False, True))
+    assert draft.scene.curves is None
+    assert (draft.flex_words, draft.flex_reach) == ("", (0.0, 0.0))
+    assert full.scene.curves is not None
+    assert full.flex_words
+    assert full.flex_reach[0] <= 0 <= full.flex_reach[1]
+    assert draft.scene.heads[1].vertices is full.scene.heads[1].vertices
+    assert draft.scene.numbers == full.scene.numbers
+
+
+def test_curves_belong_to_the_target_and_not_to_the_assumed_distance():
+    key = curve_key(DEFAULT)
+    for same in ({"distance": 0.4}, {"camera": "orthographic"}, {"flex": 3.0}, {"view": "side"}):
+        assert curve_key(changed(DEFAULT, **same)) == key
+        assert curve_of(changed(DEFAULT, **same)) is curve_of(DEFAULT)
+    for other in ({"actual": 0.5}, {"yaw": 5.0}, {"prior": 0.5}, {"modes": 50}, {"box": 3.0}):
+        assert curve_key(changed(DEFAULT, **other)) != key
+
+
+def test_the_curves_pass_through_the_numbers():
+    curves = curve_of(DEFAULT)
+    for index in (0, 20, 48):
+        numbers = frame(changed(DEFAULT, distance=float(curves.distances[index]))).scene.numbers
+        # the sweep stops at 1e-6 of the cost: both curves within their line's width, 0.01 % and 0.01 mm
+        assert numbers.d_l_percent == pytest.approx(curves.d_l_percent[index], abs=0.01)
+        assert numbers.d_s_mm == pytest.approx(curves.d_s_mm[index], abs=0.01)
+    far = frame(changed(DEFAULT, camera="orthographic")).scene.numbers
+    assert curves.orthographic == pytest.approx((far.d_l_percent, far.d_s_mm), abs=0.01)
+    assert curves.true_distance == DEFAULT.actual
+
+
+def test_a_row_shows_the_true_head_and_four_fits_from_near_to_far():
+    state = changed(DEFAULT, show="row")
+    scene = frame(state).scene
+    assert [head.name for head in scene.heads] == ["true", "fit1", "fit2", "fit3", "fit4"]
+    subject = pipeline.photograph(state.target).subject
+    assert np.array_equal(scene.heads[0].vertices, subject.vertices)
+    for head, distance in zip(scene.heads[1:], pipeline.ROW_DISTANCES, strict=True):
+        alone = frame(changed(DEFAULT, distance=distance), with_curves=False).scene
+        assert np.array_equal(head.vertices, alone.heads[1].vertices)
+        assert f"{100 * distance:g}\u202fcm" in head.title
+        words = " ".join(text for text, _ in head.caption)
+        assert f"{alone.numbers.d_s_mm:.1f}\u202fmm" in words
+        assert [tone for _, tone in head.caption] == ["d_l", "d_s"]
+    assert scene.legend is not None
+    assert [view.name for view in scene.views] == ["front", "side"]
+
+
+def test_a_bent_face_moves_by_the_millimetres_asked_for():
+    fit = pipeline.fitted(DEFAULT.target, DEFAULT.fitting)
+    model = fit.model
+    bent = pipeline.face(DEFAULT.target, DEFAULT.fitting, changed(DEFAULT, flex=3.0).bend)
+    moved = np.linalg.norm(bent.own_vertices - fit.vertices(), axis=1)[model.evaluation]
+    assert 1e3 * moved.mean() == pytest.approx(3.0, rel=1e-9)  # linear in alpha
+    assert bent.flex_mm == 3.0
+    shown = frame(changed(DEFAULT, flex=3.0))
+    assert shown.scene.numbers.flex_words == shown.flex_words
+    low, high = shown.flex_reach
+    for flex, plausible in ((0.98 * high, True), (1.02 * high, False), (0.98 * low, True)):
+        face = pipeline.face(DEFAULT.target, DEFAULT.fitting, changed(DEFAULT, flex=flex).bend)
+        assert face.plausible is plausible
+    assert np.linalg.norm(fit.alpha) < plausible_limit(70)
+
+
+def test_from_a_selfie_the_points_agree_and_the_faces_do_not():
+    # The claim of the page, with the default prior, over all ten people
+    near, far = [], []
+    for subject in range(1, 11):
+        selfie = changed(DEFAULT, subject=subject, actual=0.3)
+        near.append(frame(changed(selfie, distance=0.3), with_curves=False).scene.numbers)
+        far.append(frame(changed(selfie, distance=2.4), with_curves=False).scene.numbers)
+    assert all(numbers.converged for numbers in (*near, *far))
+    assert np.mean([n.d_l_percent for n in far]) < 1.5  # percent; a person clicks within 3
+    d_s = [np.mean([n.d_s_mm for n in numbers]) for numbers in (near, far)]
+    assert d_s[1] >= 1.5 * d_s[0]
+
+
+def test_words_and_notes_are_those_of_the_state():
+    state = changed(DEFAULT, noise=1.5, actual=0.6)
+    scene = frame(state, with_curves=False).scene
+    assert "noise 1.5 %" in scene.note
+    assert "68 points" in scene.note
+    assert "60\u202fcm" in scene.photo.caption
+    assert "noise-free" in frame(DEFAULT, with_curves=False).scene.note
+
+
+@settings(max_examples=50)
+@given(states)
+def test_a_state_is_written_without_its_defaults_and_read_again(state):
+    text = pipeline.state_json(state)
+    assert msgspec.json.decode(text, type=ViewState) == state
+    assert msgspec.json.decode(text) == {
+        name: getattr(state, name)
+        for name in FIELDS
+        if getattr(state, name) != getattr(DEFAULT, name)
+    }
+
+
+def test_equal_states_are_written_alike():
+    assert pipeline.state_json(DEFAULT) == "{}"
+    assert pipeline.state_json(changed(DEFAULT, distance=float(str(DEFAULT.distance)))) == "{}"
+    assert pipeline.state_json(ViewState(yaw=10)) == pipeline.state_json(ViewState(yaw=10.0))
+
+
+def test_a_file_is_whole_or_not_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    pipeline.write(tmp_path / "a.png", b"one")
+    pipeline.write(tmp_path / "a.png", b"two")
+    assert (tmp_path / "a.png").read_bytes() == b"two"
+
+    def full(self: Path, data: bytes) -> int:
+        self.open("wb").close()
+        raise OSError(28, "No space left on device", str(self))
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(ValueError, match=r"out: cannot write .*a\.png': No space left on device"):
+        pipeline.write(tmp_path / "a.png", b"three")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.png"]
+    assert (tmp_path / "a.png").read_bytes() == b"two"
+    with pytest.raises(ValueError, match="out: there is no folder"):
+        pipeline.write(tmp_path / "no" / "a.png", b"")
+    with pytest.raises(ValueError, match="is a folder, not a file"):
+        pipeline.write(tmp_path, b"")
