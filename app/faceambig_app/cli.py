@@ -247,7 +247,7 @@ def run_sweep(options: argparse.Namespace) -> int:
 
     import faceambig as fa
 
-    if not 0.2 <= options.low <= options.high or not 1 <= options.steps <= 1000:
+    if not 0.2 <= options.low <= options.high < float("inf") or not 1 <= options.steps <= 1000:
         raise ValueError(
             f"--from {options.low:g} --to {options.high:g} --steps {options.steps}: "
             "from at least 0.2 m up to `to`, 1 to 1000 steps"
@@ -312,7 +312,7 @@ def image_size(text: str | None) -> tuple[int, int] | None:
     if text is None:
         return None
     width, cross, height = text.lower().partition("x")
-    if not (cross and width.isdigit() and height.isdigit() and int(width) and int(height)):
+    if not (cross and width.isdecimal() and height.isdecimal() and int(width) and int(height)):
         raise ValueError(f"--image-size: {text!r} is not like 640x480")
     return int(width), int(height)
 
