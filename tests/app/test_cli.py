@@ -1,0 +1,409 @@
+"""The command line: what it prints, and that every bad input is one line and exit status 2."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import faceambig as fa
+from faceambig_app import cli, pipeline
+from faceambig_app.cli import main
+from faceambig_app.state import DEFAULT, FIELDS, ViewState, changed
+from scenes import need_renderer
+
+Capture = pytest.CaptureFixture[str]
+COMMANDS = ("serve", "snapshot", "fit", "sweep")
+
+
+def write_pts(path: Path, points: np.ndarray) -> Path:
+    rows = "\n".join("nan nan" if np.isnan(x) else f"{x:.6f} {y:.6f}" for x, y in points)
+    path.write_text(f"version: 1\nn_points: {len(points)}\n{{\n{rows}\n}}\n", encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def observation(embedded: fa.FaceModel) -> fa.Observation:
+    return fa.observe(embedded.subject(2), distance=0.4, yaw_deg=10)
+
+
+@pytest.fixture
+def pts(tmp_path: Path, observation: fa.Observation) -> Path:
+    """A landmark file as users have it; no picture beside it."""
+    return write_pts(tmp_path / "face.pts", observation.points)
+
+
+def printed(capsys: Capture, *arguments: object) -> tuple[int, str, str]:
+    """(status, stdout, stderr) of a command; argparse exits, commands return."""
+    try:
+        status = main([str(argument) for argument in arguments])
+    except SystemExit as left:
+        status = left.code if isinstance(left.code, int) else 1
+    captured = capsys.readouterr()
+    return status, captured.out, captured.err
+
+
+def refused(capsys: Capture, *arguments: object) -> str:
+    """The one line of a refusal."""
+    status, out, err = printed(capsys, *arguments)
+    assert status == 2
+    assert out == ""
+    assert err.endswith("\n")
+    assert err.count("\n") == 1, err
+    assert "Traceback" not in err
+    assert err.startswith("faceambig")
+    assert len(err) < 400
+    return err
+
+
+RECORD = {
+    "status", "camera", "distance_m", "rotation", "translation_m", "alpha", "cost", "d_l_percent", "steps", "version",
+}  # fmt: skip
+
+
+def test_fit_prints_the_record_of_a_program_in_metres_pixels_and_radians(
+    capsys, pts, embedded, observation
+):
+    status, out, err = printed(
+        capsys, "fit", pts, "--distance", 1.2, "--image-size", "500x500", "--json"
+    )
+    assert (status, err) == (0, "")
+    assert out.count("\n") == 1
+    record = json.loads(out)
+    assert record.keys() >= RECORD | {"focal_px"}
+    assert "scale" not in record
+    fit = fa.fit(embedded, observation, distance=1.2)
+    # the file has six digits after the point
+    assert record["status"] == "converged"
+    assert record["camera"] == "perspective"
+    assert record["distance_m"] == pytest.approx(1.2, rel=1e-12)
+    assert record["focal_px"] == pytest.approx(fit.focal, rel=1e-4)
+    assert np.allclose(record["rotation"], fit.rotation, rtol=0, atol=1e-4)
+    assert np.allclose(record["translation_m"], fit.translation, rtol=0, atol=1e-5)
+    assert record["translation_m"][2] == record["distance_m"]
+    assert len(record["alpha"]) == 70
+    assert record["cost"] == pytest.approx(fit.cost, rel=1e-5)
+    assert record["d_l_percent"] == pytest.approx(fit.d_l_percent, rel=1e-3)
+    assert record["d_l_unit"] == fit.interocular_meaning
+    assert re.fullmatch(r"\d+\.\d+\.\d+", record["version"])
+    assert record["points_used"] == 68
+    assert record["principal_point"] == "(250, 250), middle of the picture"
+    assert record["image_size_from"] == "given"
+
+
+def test_an_orthographic_fit_has_a_scale_and_no_distance(capsys, pts, embedded, observation):
+    _, out, _ = printed(
+        capsys, "fit", pts, "--camera", "orthographic", "--json", "--image-size", "500x500"
+    )
+    record = json.loads(out)
+    fit = fa.fit(embedded, observation, camera="orthographic")
+    assert record["camera"] == "orthographic"
+    assert record["distance_m"] is None
+    assert record["scale"] == pytest.approx(fit.scale, rel=1e-4)  # pixels per metre
+    assert "focal_px" not in record
+    assert len(record["translation_m"]) == 2
+
+
+def test_flags_reach_the_fit(capsys, pts, embedded, observation):
+    flags = (
+        "--modes",
+        20,
+        "--box",
+        3,
+        "--prior",
+        0.2,
+        "--distance",
+        0.5,
+        "--image-size",
+        "500x500",
+    )
+    _, out, _ = printed(capsys, "fit", pts, "--json", *flags)
+    fit = fa.fit(embedded, observation, distance=0.5, modes=20, box=3, noise_percent=0.2)
+    record = json.loads(out)
+    assert len(record["alpha"]) == 20
+    assert record["cost"] == pytest.approx(fit.cost, rel=1e-4)
+
+
+def test_a_fit_without_a_distance_finds_one(capsys, pts):
+    status, out, _ = printed(
+        capsys, "fit", pts, "--json", "--image-size", "500x500", "--prior", 0.1
+    )
+    assert status == 0
+    assert json.loads(out)["distance_m"] == pytest.approx(0.4, rel=0.4)  # MATH.md 2.1: errs by 20 %
+
+
+def test_fit_says_in_words_what_was_assumed(capsys, pts):
+    status, out, err = printed(capsys, "fit", pts, "--distance", 1.2)
+    assert (status, err) == (0, "")
+    assert out.startswith("converged: camera at 120 cm, landmark error d_L ")
+    assert "mean of the two corners of each eye" in out
+    assert "middle of the points" in out
+    assert "no picture beside face.pts" in out
+    _, far, _ = printed(capsys, "fit", pts, "--camera", "orthographic")
+    assert "far away (orthographic)" in far
+
+
+def test_missing_points_are_left_out_and_counted(capsys, tmp_path, observation):
+    points = observation.points.copy()
+    points[:10] = np.nan
+    file = write_pts(tmp_path / "part.pts", points)
+    _, out, _ = printed(capsys, "fit", file, "--json", "--image-size", "500x500")
+    assert json.loads(out)["points_used"] == 58
+
+
+def test_sweep_prints_every_fit_and_the_interval(capsys, pts, embedded, observation):
+    asked = ("sweep", pts, "--from", 0.3, "--to", 2.4, "--steps", 4, "--image-size", "500x500")
+    status, out, err = printed(capsys, *asked, "--json")
+    assert (status, err) == (0, "")
+    record = json.loads(out)
+    distances = [fit["distance_m"] for fit in record["fits"]]
+    assert distances[:-1] == pytest.approx([0.3, 0.6, 1.2, 2.4], rel=1e-12)
+    assert distances[-1] is None
+    assert all(fit.keys() >= RECORD for fit in record["fits"])
+    sweep = fa.sweep_distance(embedded, observation, np.geomspace(0.3, 2.4, 4))
+    found = [fit["d_l_percent"] for fit in record["fits"][:-1]]
+    assert found == pytest.approx(sweep.d_l_percent, rel=1e-3)
+    assert record["interval"] == {
+        "low_m": None,
+        "high_m": None,
+        "empty": False,
+        "tolerance_percent": 3.0,
+    }
+    status, out, err = printed(capsys, *asked)
+    assert (status, err) == (0, "")
+    rows = out.splitlines()
+    assert rows[0].split() == ["distance", "cm", "d_L", "%", "status"]
+    assert [row.split()[0] for row in rows[1:6]] == ["30", "60", "120", "240", "orthographic"]
+    assert "d_L stays under 3 % from the nearest tried to infinity" in out
+
+
+@pytest.mark.parametrize(
+    ("interval", "words"),
+    [
+        (
+            fa.Interval(None, None, True, 4.25, 3.0),
+            "no distance brings d_L under 3 %: the best is 4.25 %",
+        ),
+        (fa.Interval(0.31, 1.5, False, 0.2, 0.5), "d_L stays under 0.5 % from 31 cm to 150 cm"),
+        (fa.Interval(None, 1.5, False, 0.2, 3.0), "from the nearest tried to 150 cm"),
+        (fa.Interval(0.31, None, False, 0.2, 3.0), "from 31 cm to infinity"),
+    ],
+)
+def test_an_interval_is_a_sentence(interval, words):
+    assert words in cli.interval_words(interval)
+
+
+@pytest.mark.parametrize("command", ["fit", "sweep"])
+@pytest.mark.parametrize("flags", [[], ["--json"]])
+def test_a_fit_that_does_not_converge_is_exit_status_one(capsys, pts, monkeypatch, command, flags):
+    for name in ("fit", "sweep_distance"):
+        real = getattr(fa, name)
+        monkeypatch.setattr(
+            fa, name, lambda *a, real=real, **options: real(*a, **options, max_steps=1)
+        )
+    status, out, err = printed(capsys, command, pts, "--image-size", "500x500", *flags)
+    assert status == 1
+    assert err == ""
+    assert "step limit reached" in out
+
+
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch) -> list[tuple[ViewState, str, dict[str, Any]]]:
+    """What a snapshot would be drawn of, without a renderer."""
+    calls: list[tuple[ViewState, str, dict[str, Any]]] = []
+    monkeypatch.setattr(
+        pipeline, "snapshot", lambda state, path, **size: calls.append((state, path, size))
+    )
+    return calls
+
+
+def test_a_snapshot_is_of_the_state_of_its_flags(capsys, tmp_path, drawn):
+    out = tmp_path / "a.png"
+    flags = [
+        "--subject",
+        3,
+        "--actual",
+        0.4,
+        "--distance",
+        2,
+        "--yaw",
+        -12.5,
+        "--view",
+        "side",
+        "--seed",
+        5,
+    ]
+    size = ["--width", 640, "--height", 480]
+    assert printed(capsys, "snapshot", "--out", out, *flags, *size) == (0, "", "")
+    state = changed(DEFAULT, subject=3, actual=0.4, distance=2.0, yaw=-12.5, view="side", seed=5)
+    assert drawn == [(state, str(out), {"width": 640, "height": 480})]
+    assert printed(capsys, "snapshot", "--out", out)[0] == 0
+    assert drawn[1] == (DEFAULT, str(out), {"width": None, "height": None})
+
+
+@pytest.mark.parametrize("name", FIELDS)
+def test_every_field_of_the_state_is_a_flag(capsys, tmp_path, drawn, name):
+    field = FIELDS[name]
+    value: Any = field.choices[-1] if field.choices else field.kind(field.low)
+    status, *_ = printed(capsys, "snapshot", "--out", tmp_path / "a.png", field.flag, value)
+    assert status == 0
+    assert drawn[0][0] == changed(DEFAULT, **{name: value})
+
+
+def test_serve_is_given_host_and_port(capsys, monkeypatch):
+    import faceambig_app.server
+
+    asked: list[tuple[str, int]] = []
+    monkeypatch.setattr(faceambig_app.server, "serve", lambda *place: asked.append(place) or 0)
+    assert printed(capsys, "serve", "--port", 0)[0] == 0
+    assert printed(capsys, "serve", "--host", "::1")[0] == 0
+    assert asked == [("127.0.0.1", 0), ("::1", 8080)]
+
+
+def test_interrupted_is_exit_status_130(capsys, pts, monkeypatch):
+    def interrupt(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(fa, "fit", interrupt)
+    assert printed(capsys, "fit", pts) == (130, "", "")
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_mentions_every_flag_with_words(capsys, command):
+    status, out, err = printed(capsys, command, "--help")
+    assert (status, err) == (0, "")
+    flags = cli.parser()._subparsers._group_actions[0].choices[command]._actions  # pyright: ignore
+    assert len(flags) > 2
+    for action in flags:
+        assert action.help
+        assert "%(" not in out
+        for name in action.option_strings or [action.metavar]:
+            assert re.search(rf"(?<![\w-]){re.escape(name)}(?![\w-])", out), name
+    assert "%%" not in out
+
+
+def test_help_lists_every_command(capsys):
+    status, out, _ = printed(capsys, "--help")
+    assert status == 0
+    assert all(re.search(rf"^\s+{command}\s+\w", out, re.MULTILINE) for command in COMMANDS)
+
+
+# Each: the arguments, and what the line must name. {pts} a good file, {tmp} a folder
+BAD: dict[str, tuple[list[str], str]] = {
+    "no command": ([], "COMMAND"),
+    "unknown command": (["fitt"], "fitt"),
+    "unknown flag": (["fit", "{pts}", "--colour", "red"], "--colour"),
+    "no file": (["fit"], "FILE.pts"),
+    "missing file": (["fit", "{tmp}/none.pts"], "none.pts"),
+    "a folder for a file": (["fit", "{tmp}"], "Is a directory"),
+    "not a landmark file": (["fit", "{tmp}/words.pts"], "words.pts: not a landmark file"),
+    "damaged file": (["fit", "{tmp}/damaged.pts"], "line 6 of damaged.pts: expected two numbers, found '3 x'"),
+    "cut file": (["sweep", "{tmp}/cut.pts"], "cut.pts: ends before }"),
+    "five points": (["fit", "{tmp}/five.pts"], "points: 5 visible; 6 are needed"),
+    "points on a line": (["fit", "{tmp}/line.pts"], "points: they lie on one line"),
+    "unknown model": (["fit", "{pts}", "--model", "none"], "none: no such file or folder"),
+    "a model that is none": (["fit", "{pts}", "--model", "{pts}"], "face.pts: not a model"),
+    "distance near": (["fit", "{pts}", "--distance", "0.1"], "distance: 0.1 m is not within 0.2"),
+    "distance negative": (["fit", "{pts}", "--distance", "-1"], "distance: -1 m"),
+    "distance NaN": (["fit", "{pts}", "--distance", "nan"], "distance: nan m"),
+    "distance abc": (["fit", "{pts}", "--distance", "abc"], "'abc'"),
+    "distance far and orthographic": (["fit", "{pts}", "--camera", "orthographic", "--distance", "1"], "distance: "),
+    "camera": (["fit", "{pts}", "--camera", "fisheye"], "camera: 'fisheye'"),
+    "modes": (["fit", "{pts}", "--modes", "0"], "modes: 0"),
+    "box NaN": (["fit", "{pts}", "--box", "nan"], "box: nan"),
+    "prior": (["sweep", "{pts}", "--prior", "-1"], "noise_percent: -1"),
+    "image size words": (["fit", "{pts}", "--image-size", "big"], "--image-size: 'big' is not like 640x480"),
+    "image size half": (["fit", "{pts}", "--image-size", "640x"], "'640x'"),
+    "image size zero": (["fit", "{pts}", "--image-size", "0x480"], "'0x480'"),
+    "image size negative": (["fit", "{pts}", "--image-size=-640x480"], "'-640x480'"),
+    "image size in odd digits": (["fit", "{pts}", "--image-size", "6²x480"], "--image-size: '6²x480' is not like"),
+    "sweep backwards": (["sweep", "{pts}", "--from", "2", "--to", "1"], "--from 2 --to 1"),
+    "sweep near": (["sweep", "{pts}", "--from", "0.1"], "--from 0.1"),
+    "sweep NaN": (["sweep", "{pts}", "--to", "nan"], "--to nan"),
+    "sweep infinity": (["sweep", "{pts}", "--to", "inf"], "--to inf"),
+    "sweep far": (["sweep", "{pts}", "--to", "1e9"], "1e+09"),
+    "no steps": (["sweep", "{pts}", "--steps", "0"], "--steps 0"),
+    "too many steps": (["sweep", "{pts}", "--steps", "100000"], "--steps 100000"),
+    "half a step": (["sweep", "{pts}", "--steps", "1.5"], "'1.5'"),
+    "no out": (["snapshot"], "--out"),
+    "unknown subject": (["snapshot", "--out", "{tmp}/a.png", "--subject", "11"], "subject: 11 is not within 1 to 10"),
+    "subject nobody": (["snapshot", "--out", "{tmp}/a.png", "--subject", "me"], "subject: 'me' is not a whole number"),
+    "subject of 400 digits": (["snapshot", "--out", "{tmp}/a.png", "--subject", "9" * 400], "subject: "),
+    "snapshot distance": (["snapshot", "--out", "{tmp}/a.png", "--distance", "9"], "distance: 9 is not within 0.2 to"),
+    "snapshot NaN": (["snapshot", "--out", "{tmp}/a.png", "--actual", "nan"], "actual: nan"),
+    "snapshot abc": (["snapshot", "--out", "{tmp}/a.png", "--yaw", "abc"], "yaw: 'abc' is not a number"),
+    "snapshot view": (["snapshot", "--out", "{tmp}/a.png", "--view", "below"], "view: 'below' is not front or"),
+    "snapshot model": (["snapshot", "--out", "{tmp}/a.png", "--model", "none"], "none: no such file"),
+    "no folder": (["snapshot", "--out", "{tmp}/none/a.png"], "out: there is no folder"),
+    "out is a folder": (["snapshot", "--out", "{tmp}"], "is a folder, not a file"),
+    "width": (["snapshot", "--out", "{tmp}/a.png", "--width", "5"], "width, height: 5 is not within"),
+    "width words": (["snapshot", "--out", "{tmp}/a.png", "--width", "wide"], "'wide'"),
+    "port words": (["serve", "--port", "http"], "'http'"),
+    "port": (["serve", "--port", "99999"], "port 99999: must be from 0 to 65535"),
+    "host": (["serve", "--host", "192.0.2.1"], "host 192.0.2.1: the page is served to this machine only"),
+    "host name": (["serve", "--host", "nowhere.example"], "host 'nowhere.example'"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_input_is_one_line_and_exit_status_two(capsys, tmp_path, pts, observation, name):
+    (tmp_path / "words.pts").write_text("hello\n")
+    lines = pts.read_text().splitlines()
+    (tmp_path / "damaged.pts").write_text("\n".join([*lines[:5], "3 x", *lines[6:]]))
+    (tmp_path / "cut.pts").write_text("\n".join(lines[:30]))
+    five = np.where(np.arange(68)[:, None] < 5, observation.points, np.nan)
+    write_pts(tmp_path / "five.pts", five)
+    write_pts(tmp_path / "line.pts", np.outer(np.arange(68.0), [3, 1]) + 100)
+    arguments, words = BAD[name]
+    filled = [
+        argument.replace("{pts}", str(pts)).replace("{tmp}", str(tmp_path))
+        for argument in arguments
+    ]
+    assert words in refused(capsys, *filled)
+    assert not (tmp_path / "a.png").exists()
+
+
+@pytest.mark.gl
+def test_a_snapshot_is_a_picture_that_carries_its_state(capsys, tmp_path):
+    need_renderer()
+    files = [tmp_path / "a.png", tmp_path / "b.png"]
+    for file in files:
+        asked = ("--out", file, "--subject", 3, "--distance", 0.6, "--width", 480, "--height", 300)
+        assert printed(capsys, "snapshot", *asked) == (0, "", "")
+    picture = files[0].read_bytes()
+    assert picture.startswith(b"\x89PNG")
+    assert int.from_bytes(picture[16:20]) == 480
+    assert int.from_bytes(picture[20:24]) == 300
+    assert b'{"subject":3,"distance":0.6}' in picture
+    assert files[1].read_bytes() == picture  # the same state, the same bytes
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.png", "b.png"]
+
+
+def test_the_installed_command_says_the_same_as_main(pts):
+    # through the interpreter: warnings and tracebacks of a real run would show on stderr
+    def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+        code = "import sys; from faceambig_app.cli import main; sys.exit(main())"
+        return subprocess.run(
+            [sys.executable, "-c", code, *arguments], capture_output=True, text=True
+        )
+
+    good = run("fit", str(pts), "--distance", "0.6", "--json")
+    assert (good.returncode, good.stderr) == (0, "")
+    assert json.loads(good.stdout)["status"] == "converged"
+    bad = run("sweep", str(pts), "--to", "inf")
+    assert bad.returncode == 2
+    assert bad.stderr.count("\n") == 1
+
+
+def test_errors_are_put_on_one_line():
+    one: Callable[[BaseException], str] = cli.one_line
+    assert one(ValueError("a\n  b\tc")) == "a b c"
+    assert one(OSError(13, "Permission denied", "x.pts")) == "x.pts: Permission denied"
+    assert one(RuntimeError()) == "RuntimeError"
