@@ -189,6 +189,11 @@ class Page:
         if browser is not None:
             browser.notice(words)
 
+    @property
+    def address(self) -> str:
+        """Where the page is."""
+        return f"http://{self._server.get_host()}:{self._server.get_port()}/"
+
     def close(self) -> None:
         """Stop serving; returns within two seconds."""
         self._dispatcher.close()
@@ -218,7 +223,7 @@ def refusal(control: Any, asked: object, put: object) -> str:
 def serve(host: str, port: int) -> int:
     """Serve the page until SIGINT or SIGTERM; the exit status."""
     page = Page(host, port)
-    print(f"faceambig is at http://{host}:{port}/ (Ctrl-C ends it)", flush=True)
+    print(f"faceambig is at {page.address} (Ctrl-C ends it)", flush=True)
     stopped = threading.Event()
     status = 0
 
