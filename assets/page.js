@@ -50,11 +50,6 @@
     pressed: (element) => Object.assign(pressed, JSON.parse(element.dataset.json)),
     valuetext: (element) => Object.assign(valuetext, JSON.parse(element.dataset.json)),
     icons: (element) => Object.assign(icons, JSON.parse(element.dataset.json)),
-    colours: (element) => {
-      const array = linear(Uint8Array.from(atob(element.dataset.rgb), (c) => c.charCodeAt(0)));
-      for (const node of element.dataset.node.split(" ")) setColours(node, array);
-      window.__viserMutable?.requestRender();
-    },
   };
 
   function readData() {

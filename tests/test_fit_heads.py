@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from reference import trf
-from strategies import face_of
 
 import faceambig as fa
 from faceambig.fitting import prepare, start_pose
 from faceambig.fitting.result import FitOptions
 from faceambig.fitting.solve import Solution, kkt_error, solve
 from faceambig.metrics import surface_difference
+from reference import trf
+from strategies import face_of
 
 CASES = 100
 

@@ -163,7 +163,7 @@ def test_surface_is_wound_outward(asset, fine):
 
 
 def test_mean_is_mirror_symmetric(fine):
-    distance, mirror = cKDTree(fine).query(fine * [-1.0, 1.0, 1.0])
+    distance, mirror = map(np.asarray, cKDTree(fine).query(fine * [-1.0, 1.0, 1.0]))
     # Each pair was rounded alike, so only the order of the operator's sums differs.
     assert distance.max() < 1e-14
     assert np.array_equal(mirror[mirror], np.arange(N_FINE))

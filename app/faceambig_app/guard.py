@@ -2,7 +2,8 @@
 
 viser is pinned: the hooks name private parts, and `start` refuses any other version. They act on servers made by
 `start` alone; which server a piece of code serves is found in the context that each connection runs in. In the page
-`assets/page.js` stands before viser's script; its data come through hidden elements (`data_html`, `colour_html`).
+`assets/page.js` stands before viser's script; its data come through hidden elements (`data_html`) and, for colours,
+a hidden cloud of points (`add_colours`).
 """
 
 from __future__ import annotations
@@ -231,27 +232,12 @@ def data_html(kind: str, value: object) -> str:
     )
 
 
-def colour_html(node: str, colours: np.ndarray | None) -> str:
-    """A hidden element for `gui.add_html`: colours (V, 3) uint8 sRGB of the vertices of a mesh node.
-
-    None takes them off. A mesh of fewer vertices takes the first ones. Several nodes are separated by spaces.
-    What is in a folded panel or behind another tab does not reach the page: `add_colours` does.
-    """
-    packed = ""
-    if colours is not None:
-        _check(colours)
-        packed = base64.b64encode(colours.tobytes()).decode()
-    return (
-        f'<div hidden data-faceambig="colours" data-node="{html.escape(node)}" '
-        f'data-rgb="{packed}"></div>'
-    )
-
-
 def add_colours(scene: viser.SceneApi, parent: str, colours: np.ndarray) -> viser.PointCloudHandle:
     """Colours (V, 3) uint8 sRGB for the vertices of the meshes that stand directly below `parent`.
 
     Assign new ones to `.colors`; `.remove()` takes them off. A mesh of fewer vertices takes the first ones. They travel
-    as a cloud of points that is never shown: in the same batch as vertices, whether or not a panel is open.
+    as a cloud of points that is never shown: in the same batch as vertices, whether or not a panel is open, which a
+    hidden element is not: what is in a folded panel does not reach the page.
     """
     _check(colours)
     return scene.add_point_cloud(

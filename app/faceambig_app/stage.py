@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from faceambig.scene import Head, Photo, Scene, View
 
-from .guard import colour_html
+from .guard import add_colours
 
 LENS = 20.0  # metres to the viewer: a head 0.2 m deep is true to 0.5 %
 NEAR, FAR = 0.5, 60.0  # with 18 and 22 the canvas stayed blank behind a background picture
@@ -31,7 +31,7 @@ TO_WORLD = np.array(
 OCCLUSION_POWER = 1.3  # without it nostrils and ears glow (no shadows)
 BACKGROUND = {False: (243, 246, 249), True: (24, 28, 33)}  # light, dark
 LIGHTS = (  # direction towards the light in viewer axes (right, up, back), colour, intensity: key from above left
-    ("key", (-0.5, 0.7, 1.2), (255, 244, 232), 2.2),
+    ("key", (-0.5, 0.7, 1.2), (255, 244, 232), 2.8),
     ("fill", (0.9, 0.1, 0.8), (235, 242, 255), 0.7),
     ("rim", (0.0, 0.6, -1.0), (255, 250, 245), 0.9),
 )
@@ -91,12 +91,14 @@ class Stage:
         up = np.cross(back, right)
         centre = -(1 - 2 * PHONE_HEADS_AT) * half * up if self.phone else np.zeros(3)
         with self._client.atomic():
+            # Place before limits: the other way round viser glides there
             camera.up_direction = (0.0, 1.0, 0.0)
             camera.position = centre + LENS * back
             camera.look_at = centre
-            camera.fov = 2 * np.arctan(half / LENS)
+            camera.fov = 2 * float(np.arctan(half / LENS))
             camera.near, camera.far = NEAR, FAR
-            camera.min_orbit_distance = camera.max_orbit_distance = LENS
+            camera.min_orbit_distance = LENS  # no dolly: the wheel must not change perspective
+            camera.max_orbit_distance = LENS
         self._place(np.column_stack([right, up, back]))
 
     def _look_through(self, lens: Lens) -> None:
@@ -146,7 +148,7 @@ class Stage:
         scene = self._scene
         scene.configure_default_lights(enabled=False)
         scene.configure_environment_map(None)
-        scene.add_light_ambient("/ambient", intensity=1.0)
+        scene.add_light_ambient("/ambient", intensity=0.75)
         self._lights = scene.add_frame("/light", show_axes=False)
         for name, towards, colour, intensity in LIGHTS:
             scene.add_light_directional(
@@ -202,8 +204,9 @@ class HeadNodes:
         scene.add_label(
             f"{root}/board/mm", "50 mm", position=(0.0, BAR_AT - 0.006, 0.0), anchor="top-center"
         )
-        self._colours = client.gui.add_html("")
-        self._painted: object = None
+        # Directly below the root, where both meshes stand: the first of the fine vertices are the coarse ones
+        self._colours = add_colours(scene, root, shaded(head))
+        self._painted: object = head.colours
 
     def show(self, points: NDArray[np.float64], head: Head, draft: bool) -> None:
         """Send what changed of the head at `points` (V, 3), metres; equal arrays send nothing."""
@@ -217,7 +220,7 @@ class HeadNodes:
         self._full.visible = not draft
         if head.colours is not self._painted:
             self._painted = head.colours
-            self._colours.content = painted_html(head)
+            self._colours.colors = shaded(head)
 
     def stand(self, board: NDArray[np.float64], through_camera: bool, kept: bool) -> None:
         """In the row; or, seen through the subject's camera, where its vertices say, alone (`kept`)."""
@@ -229,15 +232,6 @@ class HeadNodes:
         """Stand along the viewer's right; the board faces the viewer."""
         self._root.position = self._slot * board[:, 0]
         self._board.wxyz = wxyz
-
-
-def painted_html(head: Head) -> str:
-    """The colours of both meshes of a head as data for the page's script."""
-    colours, coarse = (
-        shaded(head),
-        head.coarse_faces is not None,
-    )  # the first of the fine vertices are the coarse ones
-    return colour_html(f"/{head.name}/head" + (f" /{head.name}/draft" if coarse else ""), colours)
 
 
 def shaded(head: Head) -> NDArray[np.uint8]:

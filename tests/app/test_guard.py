@@ -15,7 +15,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, cast
 
 import msgspec
 import numpy as np
@@ -524,10 +524,6 @@ def test_data_are_escaped() -> None:
     text = guard.data_html("title", '"><script>x</script>')
     assert "<script>" not in text
     assert text.count('"') == 4
-    assert guard.colour_html("/a", np.array([[0, 1, 2]], np.uint8)).endswith(
-        'data-node="/a" data-rgb="AAEC"></div>'
-    )
-    assert guard.colour_html("/a /b", None).endswith('data-rgb=""></div>')
 
 
 @pytest.mark.parametrize(
@@ -535,7 +531,7 @@ def test_data_are_escaped() -> None:
 )
 def test_colours_are_checked(colours: np.ndarray) -> None:
     with pytest.raises(ValueError, match="colours must be"):
-        guard.colour_html("/a", colours)
+        guard.add_colours(cast("viser.SceneApi", None), "/a", colours)
 
 
 # ---------------------------------------------------------------- coming and going

@@ -389,6 +389,7 @@ def test_pictures_of_the_page_are_kept(visit, name, width, height, scheme):
     import cv2
 
     picture = cv2.imread(str(file))
+    assert picture is not None
     assert picture.shape[:2] == (height, width)
     # two heads in the scene: pixels of skin, redder than blue by far, on both halves of the canvas
     canvas = tab.locator("canvas[data-engine]").bounding_box()

@@ -66,7 +66,6 @@ def tiny(**options: Any) -> Tiny:
             "text": gui.add_text("Name", ""),
             "data": gui.add_html(""),
             "folder": gui.add_folder("Pose", expand_by_default=False),
-            "colours": gui.add_html(""),
         }
         with made["folder"]:
             gui.add_checkbox("Inside", False)
@@ -265,16 +264,23 @@ def seen(page: Page, colour: tuple[int, int, int]) -> bool:
 
 
 def paint(server: Tiny, colour: tuple[int, int, int], count: int = SIDE * SIDE) -> None:
-    server.made["colours"].content = guard.colour_html(
-        "/patch", np.tile(np.array(colour, np.uint8), (count, 1))
+    unpaint(server)
+    server.made["cloud"] = guard.add_colours(
+        server.client.scene, "", np.tile(np.array(colour, np.uint8), (count, 1))
     )
+
+
+def unpaint(server: Tiny) -> None:
+    cloud = server.made.pop("cloud", None)
+    if cloud is not None:
+        cloud.remove()
 
 
 def test_vertex_colours_are_those_of_the_legend(server: Tiny, page: Page) -> None:
     for colour in ((255, 255, 255), (128, 128, 128), (250, 10, 120), (12, 20, 33), (3, 5, 9)):
         paint(server, colour)
         assert seen(page, colour), (colour, page.evaluate(PIXEL))
-    server.made["colours"].content = guard.colour_html("/patch", None)
+    unpaint(server)
     assert until(
         lambda: abs(page.evaluate(PIXEL)[0] - 200) < 40
     )  # its own colour again, through viser's curve
