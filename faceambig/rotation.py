@@ -9,6 +9,8 @@ away from the viewer (MATH.md 1).
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from .arrays import Array, checked
@@ -48,13 +50,18 @@ def rotation_jacobian(r: Array) -> Array:
 
 def _coefficients(theta2: float) -> tuple[float, float, float, float]:
     """R = I + a W + b W^2: a, b and their derivatives divided by theta, at theta^2."""
-    theta = np.sqrt(theta2)
-    a = float(np.sinc(theta / np.pi))
+    theta = math.sqrt(theta2)
+    a = _sin_over(theta)
     # Half-angle for 1 - cos: the difference keeps no digit below theta = 1e-8.
-    b = 0.5 * float(np.sinc(theta / (2 * np.pi))) ** 2
+    b = 0.5 * _sin_over(0.5 * theta) ** 2
     if theta2 < 1e-30:  # only against 0/0: here da and db meet a factor of order theta^2
         return a, b, -1 / 3, -1 / 12
-    return a, b, (np.cos(theta) - a) / theta2, (a - 2 * b) / theta2
+    return a, b, (math.cos(theta) - a) / theta2, (a - 2 * b) / theta2
+
+
+def _sin_over(x: float) -> float:
+    # exact to rounding for every x > 0; np.sinc says the same in 7 us, ten times a fit
+    return math.sin(x) / x if x > 0 else 1.0
 
 
 def axis_angle(R: Array) -> Array:
