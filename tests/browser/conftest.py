@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import shutil
+import sys
 from collections.abc import Callable, Iterator
+from typing import NoReturn
 
 import pytest
 from playwright.sync_api import Browser, Error, Page, sync_playwright
@@ -18,9 +21,21 @@ FLAGS = [
 ]
 
 
+def give_up(words: str) -> NoReturn:
+    """A skip with its reason; where CI=true, a failure."""
+    if os.environ.get("CI") == "true":
+        pytest.fail(words, pytrace=False)
+    pytest.skip(words)
+
+
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
     """Chromium: FACEAMBIG_CHROMIUM, one on the path, or playwright's own."""
+    if sys.platform == "linux":
+        try:  # playwright's Node needs it, and without it dies with no more than "Connection closed"
+            ctypes.CDLL("libatomic.so.1")
+        except OSError:
+            give_up("playwright cannot start: apt-get install libatomic1")
     named = os.environ.get("FACEAMBIG_CHROMIUM")
     found = named or next(
         filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
@@ -30,9 +45,7 @@ def browser() -> Iterator[Browser]:
             chromium = playwright.chromium.launch(executable_path=found, args=FLAGS)
         except Error as error:
             words = f"no browser at {found or 'any place'}: apt-get install chromium, or playwright install chromium"
-            if os.environ.get("CI") == "true":
-                pytest.fail(f"{words}: {error.message.splitlines()[0]}", pytrace=False)
-            pytest.skip(words)
+            give_up(f"{words}: {error.message.splitlines()[0]}")
         yield chromium
         chromium.close()
 
