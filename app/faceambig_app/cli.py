@@ -39,7 +39,10 @@ HELP = {
 
 
 class Parser(argparse.ArgumentParser):
-    """argparse with errors of one line."""
+    """argparse with errors of one line, and flags in full: an abbreviation of today may mean two things tomorrow."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options, allow_abbrev=False)
 
     def error(self, message: str) -> NoReturn:
         """One line on stderr, exit status 2."""

@@ -105,7 +105,8 @@ def face(target: Target, fitting: Fitting, bend: Bend) -> Face:
         subject,
         fit,
         bend.flex * modes.directions[0],
-        limit=plausible_limit(len(fit.alpha)),
+        # A fit that is beyond the limit by itself is not blamed on the bend that leads back
+        limit=max(plausible_limit(len(fit.alpha)), float(np.linalg.norm(fit.alpha))),
         flex_words=modes.words[0],
         flex_mm=bend.flex,
     )

@@ -78,8 +78,8 @@ def test_the_same_bytes_twice_and_nothing_half_written(tmp_path):
 
 
 def test_the_picture_carries_its_state(tmp_path):
-    from PIL import Image
+    from PIL.PngImagePlugin import PngImageFile
 
     snapshot(ViewState(subject=4, distance=0.6), tmp_path / "a.png", width=640, height=400)
-    with Image.open(tmp_path / "a.png") as picture:
+    with PngImageFile(tmp_path / "a.png") as picture:
         assert picture.text["ViewState"] == '{"subject":4,"distance":0.6}'
