@@ -20,7 +20,7 @@ from . import figures, guard
 from .panel import Panel
 from .pipeline import Frame, curve_key, curve_of, frame, model, photo_jpeg
 from .room import Dispatcher, Room
-from .stage import FAR, HALF_WIDTH, LENS, NEAR, Stage
+from .stage import FAR, FIRST_FOV, FIRST_POSITION, NEAR, Stage
 from .state import DEFAULT, ViewState
 from .text import say
 
@@ -162,8 +162,8 @@ class Page:
         # For everybody and before the first browser: a client that learns "up" later keeps its camera's old one
         self._server.scene.set_up_direction("+y")
         self._server.initial_camera.up = (0.0, 1.0, 0.0)
-        self._server.initial_camera.position = (0.0, 0.0, LENS)
-        self._server.initial_camera.fov = 2 * HALF_WIDTH / LENS
+        self._server.initial_camera.position = FIRST_POSITION
+        self._server.initial_camera.fov = FIRST_FOV
         self._server.initial_camera.near, self._server.initial_camera.far = NEAR, FAR
         self._server.on_client_connect(self._enter)
         self._server.on_client_disconnect(self._leave)

@@ -25,6 +25,10 @@ TITLE_AT, BAR_AT = 0.155, -0.165  # metres above and below the pivot
 NARROW = 1100  # pixels: two panels of 372 leave too little for two heads
 PHONE = 577  # pixels: at most 576 wide, viser shows its panel as a sheet over the lower part
 PHONE_HEADS_AT = 0.19  # share of the height, from the top, where the heads stand above the sheet
+FIRST_POSITION, FIRST_FOV = (
+    (0.0, 0.0, LENS),
+    0.0257,
+)  # of a browser that has heard nothing yet; no view uses this angle
 TO_WORLD = np.array(
     [1.0, -1.0, -1.0]
 )  # camera axes (y down, z forward) to the page's (y up, z to the viewer)
@@ -50,6 +54,7 @@ class Stage:
         self._heads: dict[str, HeadNodes] = {}
         self._view: View | Lens | None = None
         self._board = np.eye(3)
+        self._aim = (np.array(FIRST_POSITION), FIRST_FOV)  # where the last look put the viewer
         self._size = (0, 0)  # pixels of the canvas the zoom was made for
         self._light_room()
         client.camera.on_update(self._turned)
@@ -96,10 +101,18 @@ class Stage:
             camera.position = centre + LENS * back
             camera.look_at = centre
             camera.fov = 2 * float(np.arctan(half / LENS))
+            self._aim = (centre + LENS * back, camera.fov)
             camera.near, camera.far = NEAR, FAR
             camera.min_orbit_distance = LENS  # no dolly: the wheel must not change perspective
             camera.max_orbit_distance = LENS
         self._place(np.column_stack([right, up, back]))
+
+    def _aimed(self, camera: viser.CameraHandle) -> bool:
+        position, fov = self._aim
+        return (
+            bool(np.allclose(camera.position, position, atol=1e-3))
+            and abs(camera.fov / fov - 1) < 1e-3
+        )
 
     def _look_through(self, lens: Lens) -> None:
         camera = self._client.camera
@@ -115,9 +128,14 @@ class Stage:
             # Shifting the axis instead of the picture: on a phone the face stands in the upper part
             camera.look_at = (0.0, -up * lens.distance, -lens.distance)
             camera.fov = 2 * float(np.arctan(tall))
+            self._aim = (np.zeros(3), camera.fov)
             self._lights.wxyz = (1.0, 0.0, 0.0, 0.0)
 
     async def _turned(self, camera: viser.CameraHandle) -> None:  # async: on the loop, cheap
+        if self._view is not None and _at_first(camera) and not self._aimed(camera):
+            # The browser went to its first camera after ours: when it connects, in no order, or by "Reset View"
+            self.look(self._view)
+            return
         if isinstance(self._view, Lens):
             if (camera.image_width, camera.image_height) != self._size:
                 self.look(self._view)
@@ -168,6 +186,14 @@ def _lens(photo: Photo) -> Lens:
     focal = photo.focal if photo.fit_focal is None else photo.fit_focal
     points = photo.vertices if photo.fit_vertices is None else photo.fit_vertices
     return Lens(float(points[:, 2].mean()), 0.5 * photo.height / focal)
+
+
+def _at_first(camera: viser.CameraHandle) -> bool:
+    """Whether a browser reports the camera that every browser starts with."""
+    return (
+        bool(np.allclose(camera.position, FIRST_POSITION, atol=1e-3))
+        and abs(camera.fov / FIRST_FOV - 1) < 1e-3
+    )
 
 
 class HeadNodes:

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from faceambig.render import gl
 from faceambig.render.overlay import encode_png
 from faceambig_app import ViewState, snapshot
 from faceambig_app.state import changed
+from scenes import GOLDEN, need_renderer
 
 pytestmark = pytest.mark.gl
-GOLDEN = Path(__file__).resolve().parents[1] / "golden"
 # Mean over the picture of the absolute difference, and share of pixels that differ by more than 24 of 255. Measured 0
 # between OSMesa and EGL on one machine; another processor may round edges of triangles otherwise.
 MEAN, SHARE, CLEARLY = 0.3, 0.002, 24
@@ -22,12 +20,7 @@ MEAN, SHARE, CLEARLY = 0.3, 0.002, 24
 
 @pytest.fixture(autouse=True)
 def renderer() -> None:
-    try:
-        gl.renderer_name()
-    except gl.NoRendererError as error:
-        if os.environ.get("CI") == "true":
-            raise
-        pytest.skip(str(error))
+    need_renderer()
 
 
 STATES = {

@@ -278,6 +278,18 @@ def test_the_wheel_does_not_change_perspective(visit):
     assert distance == pytest.approx(20, rel=0.01)  # metres: a long lens
 
 
+def test_a_browser_that_goes_back_to_its_first_camera_is_put_right(visit):
+    me = visit(
+        390, 844
+    )  # on a phone the view is not the first camera's: the heads stand above the sheet
+    before = me.tab.evaluate(CAMERA)["position"]
+    me.tab.evaluate("() => __viserMutable.resetCameraPose()")
+    me.until(
+        lambda: np.allclose(me.tab.evaluate(CAMERA)["position"], before, atol=0.01),
+        "the heads stayed behind the sheet",
+    )
+
+
 def test_view_buttons_say_which_is_on_and_turn_the_heads(visit):
     me = visit()
     for name, forward in (("Front", 0.0), ("Side", 90.0), ("3/4", 32.0)):
