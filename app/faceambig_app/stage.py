@@ -189,10 +189,10 @@ def _lens(photo: Photo) -> Lens:
 
 
 def _at_first(camera: viser.CameraHandle) -> bool:
-    """Whether a browser reports the camera that every browser starts with."""
-    return (
-        bool(np.allclose(camera.position, FIRST_POSITION, atol=1e-3))
-        and abs(camera.fov / FIRST_FOV - 1) < 1e-3
+    """Whether a browser stands where every browser starts; "Reset View" leaves its angle as it is."""
+    return bool(
+        np.allclose(camera.position, FIRST_POSITION, atol=1e-3)
+        and np.allclose(camera.look_at, 0.0, atol=1e-3)
     )
 
 
