@@ -45,7 +45,7 @@ canvas[data-engine]{background:#F3F6F9}[data-mantine-color-scheme=dark] canvas[d
 .mantine-Slider-root:has(.mantine-Slider-markLabel){padding-bottom:20px!important}
 .mantine-Slider-markLabel{margin-top:7px;font-size:11px!important;color:var(--fa-dim)!important}
 label[for]{color:var(--fa-dim)!important;letter-spacing:0!important;font-size:13px!important}
-[data-mantine-color-scheme=dark] .mantine-Tabs-tab{color:#7AB7FF!important}
+[data-mantine-color-scheme=dark] [style*="color: var(--mantine-primary-color-filled)"]{color:#7AB7FF!important}
 @media(max-width:576px){.mantine-Paper-root[style*="20em"]{width:100%!important;left:0!important;right:0!important}
 .mantine-ScrollArea-content>div[style*="20em"]{width:100%!important}}
 .fa-warn{border-left:4px solid #C8102E;padding-left:8px}

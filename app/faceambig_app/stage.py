@@ -224,7 +224,7 @@ class HeadNodes:
             ]
         )
         scene.add_line_segments(
-            f"{root}/board/bar", bar.astype(np.float32), (82, 96, 109), thickness=2.0, thickness_units="screen",
+            f"{root}/board/bar", bar.astype(np.float32), (120, 134, 148), thickness=2.0, thickness_units="screen",
             position=(0.0, BAR_AT, 0.0),
         )  # fmt: skip
         scene.add_label(

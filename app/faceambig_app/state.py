@@ -215,7 +215,7 @@ def changed(state: ViewState, **values: Any) -> ViewState:
 def parse(kind_of: Field, text: str) -> Any:
     """The value of a field written as text (address, flag); ValueError if it is none."""
     if kind_of.kind is str:
-        return text
+        return text.replace("-", "_")  # three-quarter, as people write it
     try:
         return kind_of.kind(text)
     except ValueError as error:
