@@ -28,18 +28,19 @@ def solve_box_qp(
     fewest, tries = n + 1, BLOCK_TRIES
     d = np.zeros(n)
     for _ in range(max_rounds):
-        d = np.where(active == AT_LOW, low, np.where(active == AT_HIGH, high, 0.0))
-        bound = active != FREE
-        if bound.any():
-            free = ~bound
-            rhs = g[free] - H[np.ix_(free, bound)] @ d[bound]
-            d[free] = _solve(H[np.ix_(free, free)], rhs)
-            slope = g - H @ d  # > 0: a larger d_j would lower the cost
-        else:
+        free = active == FREE
+        if free.all():
             d = _solve(H, g)
-            slope = np.zeros(n)
-        below, above = (active == FREE) & (d < low), (active == FREE) & (d > high)
-        leave = ((active == AT_LOW) & (slope > scale)) | ((active == AT_HIGH) & (slope < -scale))
+            below, above, leave = d < low, d > high, ~free
+        else:
+            d = np.where(active == AT_LOW, low, np.where(active == AT_HIGH, high, 0.0))
+            rows = H[free]
+            d[free] = _solve(rows[:, free], g[free] - rows @ d)
+            slope = g - H @ d  # > 0: a larger d_j would lower the cost
+            below, above = free & (d < low), free & (d > high)
+            leave = ((active == AT_LOW) & (slope > scale)) | (
+                (active == AT_HIGH) & (slope < -scale)
+            )
         wrong = below | above | leave
         count = int(np.count_nonzero(wrong))
         if count == 0:
