@@ -224,8 +224,6 @@ def refusal(control: Any, asked: object, put: object) -> str:
 
 def serve(host: str, port: int) -> int:
     """Serve the page until SIGINT or SIGTERM; the exit status."""
-    page = Page(host, port)
-    print(f"faceambig is at {page.address} (Ctrl-C ends it)", flush=True)
     stopped = threading.Event()
     status = 0
 
@@ -234,8 +232,10 @@ def serve(host: str, port: int) -> int:
         status = 130 if number == signal.SIGINT else 0
         stopped.set()
 
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in (signal.SIGINT, signal.SIGTERM):  # before anybody can know that the page is there
         signal.signal(number, stop)
+    page = Page(host, port)
+    print(f"faceambig is at {page.address} (Ctrl-C ends it)", flush=True)
     stopped.wait()
     page.close()
     return status
