@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from .arrays import Array
 from .camera import Camera, camera_points, project
 from .fitting import Fit
-from .metrics import HUMAN_TOLERANCE_PERCENT, surface_difference
+from .metrics import HUMAN_TOLERANCE_PERCENT, mean_gap_percent, surface_difference
 from .model import FaceModel, Subject
 from .observation import Observation
 from .scene import Curves, Head, Legend, Numbers, Photo, Scene, View
@@ -77,13 +77,13 @@ def measure(
     own = model.vertices(alpha)
     surface = surface_difference(own, subject.vertices, model.evaluation)
     projected = project(fit.camera, own[observation.vertices(model)]) + observation.centre
-    gaps = np.linalg.norm((observation.points - projected)[observation.visible], axis=1)
+    gaps = (observation.points - projected)[observation.visible]
     return Face(
         fit=fit,
         own_vertices=own,
         vertices=own @ surface.rotation.T + surface.translation,
         projected=projected,
-        d_l_percent=100.0 * float(gaps.mean()) / fit.interocular_px,
+        d_l_percent=mean_gap_percent(gaps, fit.interocular_px),
         d_s_mm=surface.mean_mm,
         gaps_mm=1e3 * surface.distances,
         plausible=bool(np.linalg.norm(alpha) <= limit),

@@ -48,6 +48,11 @@ def interocular(points: ArrayLike, scheme: Scheme) -> float:
     return distance
 
 
+def mean_gap_percent(gaps: Array, interocular_px: float) -> float:
+    """d_L of the gaps (n, 2) between visible points and their projections, pixels: the one place of its formula."""
+    return 100.0 * float(np.linalg.norm(gaps, axis=1).mean()) / interocular_px
+
+
 def landmark_error_percent(
     observed: ArrayLike,
     projected: ArrayLike,
@@ -83,7 +88,7 @@ def landmark_error_percent(
     unit = interocular(x, scheme) if interocular_px is None else interocular_px
     if not unit > 0:
         raise ValueError(f"interocular_px: {unit!r} is not a distance in pixels")
-    return 100.0 * float(np.linalg.norm(x[visible] - y[visible], axis=1).mean()) / unit
+    return mean_gap_percent(x[visible] - y[visible], unit)
 
 
 def align(

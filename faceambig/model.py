@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -141,9 +140,4 @@ class FaceModel:
         """The same model with its first `n_modes` modes."""
         if not 1 <= n_modes <= self.n_modes:
             raise ValueError(f"modes: {n_modes} is not within 1 to {self.n_modes}")
-        return replace_model(self, control_modes=self.control_modes[:, :, :n_modes])
-
-
-def replace_model(model: FaceModel, **changes: Any) -> FaceModel:
-    """`model` with some fields changed; `mean` follows by itself."""
-    return replace(model, **changes)
+        return replace(self, control_modes=self.control_modes[:, :, :n_modes])

@@ -11,7 +11,7 @@ import faceambig as fa
 from faceambig import compose as fc
 from faceambig.flex import plausible_limit
 from faceambig.metrics import landmark_error_percent, surface_difference
-from faceambig.model import Subject, replace_model
+from faceambig.model import Subject
 from faceambig.observation import portrait_camera
 from faceambig.scene import Photo
 from strategies import face_of, tiny_model
@@ -236,7 +236,7 @@ def test_a_face_that_is_none_loses_its_colour(subject, face, picture):
 
 def test_colours_are_the_subjects_else_the_models_else_clay():
     own = np.full((30, 3), 7, dtype=np.uint8)
-    coloured = replace_model(MODEL, colours=own + np.uint8(1))
+    coloured = replace(MODEL, colours=own + np.uint8(1))
     assert (fc.skin(replace(SUBJECT, colours=own)) == 7).all()
     assert (fc.skin(replace(SUBJECT, model=coloured)) == 8).all()
     assert (fc.skin(SUBJECT) == fc.CLAY).all()

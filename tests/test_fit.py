@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -12,7 +14,6 @@ from faceambig.camera import Camera, project
 from faceambig.fitting import prepare, start_pose
 from faceambig.fitting.result import FitOptions
 from faceambig.fitting.solve import Solution, cost, kkt_error, solve
-from faceambig.model import replace_model
 from faceambig.rotation import angles_from_rotation, rotation_matrix
 from reference import trf
 from strategies import face_of, tiny_model
@@ -44,8 +45,6 @@ def test_no_optimiser_started_there_finds_a_lower_cost(camera, distance, seed, l
     task = prepare(MODEL, drawn(seed), options)
     problem = task.problem
     if distance is None and camera == "perspective":
-        from dataclasses import replace
-
         problem = replace(problem, free_distance=True)
     kappa = {"orthographic": 0.0}.get(camera, 1.0 / (distance or 1.0))
     start = start_pose(task.problem, kappa)
@@ -207,9 +206,7 @@ def test_bad_points_are_refused_by_name():
 
 
 def test_points_of_the_model_on_one_line_are_refused():
-    straight = replace_model(
-        MODEL, control_mean=np.outer(np.linspace(-0.1, 0.1, 24), [1.0, 0.2, 0.1])
-    )
+    straight = replace(MODEL, control_mean=np.outer(np.linspace(-0.1, 0.1, 24), [1.0, 0.2, 0.1]))
     with pytest.raises(ValueError, match="on the model they lie on one line"):
         fa.fit(straight, drawn(1), distance=0.6)
 

@@ -15,7 +15,6 @@ from scipy.stats import chi
 import faceambig as fa
 from faceambig.camera import project
 from faceambig.flex import DIRECTIONS, FlexibilityModes, gram, plausible_limit
-from faceambig.model import replace_model
 from strategies import face_of, tiny_model
 
 S = 8
@@ -233,7 +232,7 @@ def test_a_model_without_regions_speaks_of_the_face():
 
 def test_modes_are_measured_where_the_model_is():
     part = np.arange(10)
-    measured = replace_model(MODEL, evaluation=part)
+    measured = replace(MODEL, evaluation=part)
     fit = replace(fitted(), model=measured)
     for f in fa.flexibility_modes(measured, fit, count=3).directions:
         moved = np.linalg.norm(surface_change(measured, f)[part], axis=1)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import sparse
 
-from faceambig.model import FaceModel, replace_model
+from faceambig.model import FaceModel
 from strategies import face_of, tiny_model
 
 B, N, S = 30, 50, 5
@@ -21,14 +23,14 @@ def subdivided() -> FaceModel:
     middles = np.zeros((N - B, B))
     for k, row in enumerate(middles):
         row[k : k + 3] = (0.5, 0.3, 0.2)
-    return replace_model(model, subdivision=sparse.csr_array(np.vstack([np.eye(B), middles])))
+    return replace(model, subdivision=sparse.csr_array(np.vstack([np.eye(B), middles])))
 
 
 def expanded(model: FaceModel) -> FaceModel:
     """The same model without an operator: mean and modes written out for every surface vertex."""
     dense = np.eye(B) if model.subdivision is None else model.subdivision.toarray()
     modes = np.einsum("nb,bks->nks", dense, model.control_modes)
-    return replace_model(
+    return replace(
         model, control_mean=dense @ model.control_mean, control_modes=modes, subdivision=None
     )
 
@@ -61,7 +63,7 @@ def test_rows_are_the_face_at_those_vertices(alpha, vertices):
 
 @given(st.tuples(*[st.floats(-1, 1)] * 3).map(np.array))
 def test_moving_the_control_vertices_moves_the_surface(shift):
-    moved = replace_model(MODEL, control_mean=MODEL.control_mean + shift)
+    moved = replace(MODEL, control_mean=MODEL.control_mean + shift)
     assert np.abs(moved.mean - (MODEL.mean + shift)).max() < 2 * ROUNDING
 
 
@@ -81,7 +83,7 @@ def test_a_truncated_model_makes_the_same_faces_with_its_modes():
 
 
 def test_a_changed_model_has_its_own_mean_and_its_subjects_know_it():
-    with_subject = replace_model(MODEL, subjects=(face_of(MODEL, np.ones(S)),))
+    with_subject = replace(MODEL, subjects=(face_of(MODEL, np.ones(S)),))
     short = with_subject.truncate(3)
     assert short.subject(1).model is short
     assert with_subject.subject(1).model is with_subject
@@ -90,7 +92,7 @@ def test_a_changed_model_has_its_own_mean_and_its_subjects_know_it():
 
 def test_the_arrays_of_a_model_cannot_be_written():
     own = MODEL.control_mean.copy()
-    model = replace_model(MODEL, control_mean=own, subjects=(face_of(MODEL, np.ones(S)),))
+    model = replace(MODEL, control_mean=own, subjects=(face_of(MODEL, np.ones(S)),))
     arrays = (
         model.mean,
         model.control_mean,
@@ -125,16 +127,16 @@ def test_unknown_names_list_what_there_is():
     with pytest.raises(ValueError, match="unknown scheme 'ibug': this model has all"):
         MODEL.scheme("ibug")
     with pytest.raises(ValueError, match="unknown scheme 'all': this model has none"):
-        replace_model(MODEL, schemes={}).scheme("all")
+        replace(MODEL, schemes={}).scheme("all")
     two = {"all": MODEL.scheme("all"), "some": MODEL.scheme("all")}
     with pytest.raises(ValueError, match="this model has all or some"):
-        replace_model(MODEL, schemes=two).scheme("x")
+        replace(MODEL, schemes=two).scheme("x")
 
 
 def test_subjects_count_from_one():
     with pytest.raises(ValueError, match="model 'tiny' has no subjects"):
         MODEL.subject(1)
-    model = replace_model(MODEL, subjects=(face_of(MODEL, np.ones(S)), face_of(MODEL, -np.ones(S))))
+    model = replace(MODEL, subjects=(face_of(MODEL, np.ones(S)), face_of(MODEL, -np.ones(S))))
     assert np.array_equal(model.subject(2).vertices, MODEL.vertices(-np.ones(S)))
     for bad in (0, 3, -1):
         with pytest.raises(ValueError, match=f"unknown subject {bad}: 1 to 2"):

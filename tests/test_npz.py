@@ -6,6 +6,7 @@ import io
 import re
 import zipfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ import faceambig.io as fio
 from faceambig.errors import AssetError
 from faceambig.io.npz import MAX_BYTES
 from faceambig.metrics import surface_difference
-from faceambig.model import FaceModel, replace_model
+from faceambig.model import FaceModel
 from strategies import tiny_model
 
 B, N, S = 70, 90, 4
@@ -194,7 +195,7 @@ def test_a_plain_model_is_saved_without_what_it_lacks(tmp_path):
 
 
 def test_regions_that_overlap_are_not_saved_wrongly(tmp_path):
-    model = replace_model(tiny_model(), regions={"a": np.array([1, 2]), "b": np.array([2, 3])})
+    model = replace(tiny_model(), regions={"a": np.array([1, 2]), "b": np.array([2, 3])})
     with pytest.raises(ValueError, match="regions: 'b' shares a vertex"):
         fio.save_model(model, tmp_path / "tiny.npz")
     assert list(tmp_path.iterdir()) == []

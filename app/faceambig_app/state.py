@@ -189,24 +189,6 @@ def check(field: Field, value: Any) -> None:
         )
 
 
-def clamp(field: Field, value: Any) -> tuple[Any, bool]:
-    """(nearest allowed value, whether it differs from `value`) of a number; ValueError if it is none."""
-    if field.kind is str:
-        check(field, value)
-        return value, False
-    try:
-        number = float(value)
-    except OverflowError:  # a whole number beyond every float
-        number = math.inf if value > 0 else -math.inf
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{field.name}: {value!r} is not a number") from error
-    if math.isnan(number):
-        raise ValueError(f"{field.name}: {value!r} is not a number")
-    near = min(max(number, field.low), field.high)
-    near = round(near) if field.kind is int else near
-    return near, near != number
-
-
 def changed(state: ViewState, **values: Any) -> ViewState:
     """`state` with some fields changed; ValueError if a value is out of range."""
     return msgspec.structs.replace(state, **values)

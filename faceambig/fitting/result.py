@@ -9,6 +9,7 @@ import numpy as np
 
 from ..arrays import Array, read_only
 from ..camera import Camera, project
+from ..metrics import mean_gap_percent
 from ..model import FaceModel
 from ..observation import Observation
 
@@ -89,8 +90,7 @@ class Fit:
     @property
     def d_l_percent(self) -> float:
         """d_L: mean landmark distance in percent of the interocular distance, over the visible points."""
-        gaps = np.linalg.norm(self.residual[self.observation.visible], axis=1)
-        return 100.0 * float(gaps.mean()) / self.interocular_px
+        return mean_gap_percent(self.residual[self.observation.visible], self.interocular_px)
 
     def vertices(self) -> Array:
         """The fitted surface (N, 3), metres, model axes."""

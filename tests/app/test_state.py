@@ -16,7 +16,6 @@ from faceambig_app.state import (
     ViewState,
     changed,
     check,
-    clamp,
     parse,
 )
 
@@ -154,26 +153,6 @@ def test_a_whole_number_is_not_a_fraction():
 def test_words_that_are_no_choice_are_refused_with_the_choices(field, bad):
     with pytest.raises(ValueError, match=f"^{field.name}: .* is not {field.choices[0]} or "):
         ViewState(**{field.name: bad})
-
-
-@given(st.sampled_from(NUMBERS), st.floats(allow_nan=False) | st.integers() | st.just(10**400))
-def test_clamp_gives_the_nearest_allowed_value(field, value):
-    near, moved = clamp(field, value)
-    check(field, near)
-    assert moved == (near != value)
-    if field.low <= value <= field.high:
-        assert abs(near - value) <= (0.5 if field.kind is int else 0)
-    else:
-        assert near == (field.low if value < field.low else field.high)
-
-
-@pytest.mark.parametrize("bad", [math.nan, "abc", None, [], " nan"])
-def test_clamp_refuses_what_is_no_number(bad):
-    with pytest.raises(ValueError, match=r"^distance: .* is not a number$"):
-        clamp(FIELDS["distance"], bad)
-    with pytest.raises(ValueError, match=r"^view: "):
-        clamp(FIELDS["view"], bad)
-    assert clamp(FIELDS["view"], "side") == ("side", False)
 
 
 @given(states)
