@@ -304,10 +304,11 @@ def test_view_buttons_say_which_is_on_and_turn_the_heads(visit):
         )
         me.tab.wait_for_timeout(600)
         back = np.array(me.tab.evaluate(CAMERA)["matrix"][8:11])
-        # model +z is the page's own front: the angle between it and the viewer, elevation aside
         head = np.array(me.tab.evaluate(PLACE, "/true")) - np.array(me.tab.evaluate(PLACE, "/fit"))
         assert abs(back @ head) < 1e-2 * np.linalg.norm(head)
-        assert forward >= 0
+        # a face looks along -z of the page's world; three-quarter is also 6 degrees from above
+        turned = math.degrees(math.acos(np.clip(-back[2], -1, 1)))
+        assert turned == pytest.approx(forward, abs=1.5)
 
 
 def test_through_the_camera_the_eyes_keep_their_distance(visit):
