@@ -16,15 +16,17 @@ def pose_from_points(points: Array, mean: Array, mean_pinv: Array, kappa: float)
     landmarks; its 2 x 3 part made orthonormal by the polar decomposition, s the mean singular value; the third row is
     their cross product, so det R = +1 always. s is corrected for the depth of the landmarks at distance 1 / kappa.
     """
-    x_mean, v_mean = points.mean(axis=0), mean.mean(axis=0)
+    count = len(points)
+    x_mean, v_mean = points.sum(axis=0) / count, mean.sum(axis=0) / count
     # LAPACK itself: np.linalg.svd spends three times as long around it
     U, sv, Vt, _ = lapack.dgesdd((mean_pinv @ (points - x_mean)).T, full_matrices=0)
-    rows = U @ Vt
-    R = np.vstack([rows, _cross(rows[0], rows[1])])
+    R = np.empty((3, 3))
+    R[:2] = U @ Vt
+    R[2] = _cross(*R[:2].tolist())
     q = R @ v_mean
-    depth = 1.0 + kappa * q[2]
-    s = float(sv.mean()) * depth
-    return Camera(R, x_mean * depth / s - q[:2], s, kappa)
+    depth = 1.0 + kappa * float(q[2])
+    s = float(sv[0] + sv[1]) / 2 * depth
+    return Camera(R, x_mean * (depth / s) - q[:2], s, kappa)
 
 
 def centred_pinv(mean: Array) -> Array:
@@ -34,8 +36,6 @@ def centred_pinv(mean: Array) -> Array:
     return np.linalg.pinv(centred.T @ centred, hermitian=True) @ centred.T
 
 
-def _cross(a: Array, b: Array) -> Array:
+def _cross(a: list[float], b: list[float]) -> list[float]:
     # np.cross costs 15 us for two vectors; this is called once a fit
-    return np.array(
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    )
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
