@@ -1,12 +1,16 @@
 """How often one closed-form start reaches the best optimum of many starts: no pose, no focal length is given.
 
-`python benchmarks/start_anywhere.py [--cases 1000] [--starts 10] [--json] [--check]`: ICT-FaceKit if FACEAMBIG_ICT names
-its folder, else the embedded head. A case counts as found if its cost is at most 1e-6 (relative) above the best of all
-starts: the closed form, the truth's pose with the mean face, the pose mirrored in depth, and turned by 30 to 60 degrees
-with random shape, scale and (free) distance. Misses are printed with seed and pose. --check fails below 99.8 %.
+`python benchmarks/start_anywhere.py [--cases 1000] [--starts 10] [--json] [--check]`: ICT-FaceKit if FACEAMBIG_ICT
+names its folder, else the embedded head; ten minutes. A case counts as found if its cost is at most 1e-6 (relative)
+above the best of all starts: the closed form, the truth's pose with the mean face, the pose mirrored in depth, and
+turned by 30 to 60 degrees with random shape, scale and (free) distance. Misses are printed with seed and pose.
 
 Cases: yaw within 75, pitch 40, roll 60 degrees, 0.25 to 5 m, off the middle by up to one eye distance, noise 0 to 2 px
 at 100 px between the eyes; the fitting distance within a factor e of the truth, at least 0.2 m; shapes of all modes.
+The last table counts how often points are refused as those of a face from behind: rightly, with left and right
+exchanged, the picture mirrored or y upward, and wrongly, as drawn or upside down.
+
+--check fails below 99.8 % in any row of the first table, and if one of its cases is refused wrongly or not refused.
 """
 
 from __future__ import annotations
@@ -24,9 +28,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 import faceambig as fa
-from faceambig.camera import Camera, project
-from faceambig.fitting import prepare, start_pose
-from faceambig.fitting.solve import Problem, cost, solve
+from faceambig.camera import Camera, depths, project
+from faceambig.fitting import FIRST_KAPPA, prepare, start_pose
+from faceambig.fitting.solve import Problem, Solution, solve
 from faceambig.observation import portrait_camera
 from faceambig.rotation import rotation_from_angles, rotation_matrix
 
@@ -37,6 +41,7 @@ LAMBDAS = (1.0, 0.01)  # px^2
 KINDS = ("fixed", "free", "orthographic")
 FEW, FEW_CASES = (6, 8, 12), 200
 ODD_CASES = 200
+RIGHT = ("as drawn", "picture upside down")  # the rest of `damaged` is wrong
 SIDE = 500  # pixels of the picture's side, 5 eye distances
 
 
@@ -61,9 +66,7 @@ def draw(
 ) -> Case:
     """Case `seed`: |yaw| and |roll| within the ranges, in degrees; `points` of the 68 visible, None: all."""
     rng = np.random.default_rng(seed)
-    face = fa.Subject(
-        "drawn", "", model.vertices(rng.standard_normal(model.n_modes)), None, model
-    )
+    face = fa.Subject("drawn", "", model.vertices(rng.standard_normal(model.n_modes)), None, model)
     actual = float(np.exp(rng.uniform(np.log(0.25), np.log(5.0))))
     fitted = max(0.2, actual * float(np.exp(rng.uniform(-1, 1))))
     signs = rng.choice([-1.0, 1.0], 2)
@@ -122,7 +125,18 @@ def mirrored_in_depth(camera: Camera) -> Camera:
 
 
 def in_front(problem: Problem, camera: Camera, alpha: np.ndarray) -> bool:
-    return np.isfinite(cost(problem, camera, alpha)).item()
+    return bool(depths(camera, problem.mean + problem.modes @ alpha).min() > 0)
+
+
+def compare(case: Case, problem: Problem, kind: str, count: int) -> tuple[Solution, np.ndarray]:
+    """The fit from the closed form, and the costs reached from `count` other starts."""
+    problem = replace(problem, free_distance=kind == "free")
+    kappa = {"fixed": 1 / case.fitted, "free": FIRST_KAPPA, "orthographic": 0.0}[kind]
+    start = start_pose(problem, kappa)
+    ours = solve(problem, start, np.zeros(problem.modes.shape[2]))
+    rng = np.random.default_rng([case.seed, KINDS.index(kind)])
+    others = other_starts(case, problem, start, count, rng)
+    return ours, np.array([solve(problem, camera, alpha).cost for camera, alpha in others])
 
 
 @dataclass(slots=True)
@@ -149,18 +163,13 @@ def measure(
     misses: list[str] = []
     for case in cases:
         for (kind, lam), tally in tallies.items():
-            problem = prepare(model, case.observation, fa.FitOptions(prior_weight=lam)).problem
-            problem = replace(problem, free_distance=kind == "free")
-            kappa = {"fixed": 1 / case.fitted, "free": 1.0, "orthographic": 0.0}[kind]
-            start = start_pose(problem, kappa)
-            ours = solve(problem, start, np.zeros(problem.modes.shape[2]))
-            rng = np.random.default_rng([case.seed, KINDS.index(kind)])
-            costs = np.array(
-                [
-                    solve(problem, camera, alpha).cost
-                    for camera, alpha in other_starts(case, problem, start, starts, rng)
-                ]
-            )
+            try:
+                problem = prepare(model, case.observation, fa.FitOptions(prior_weight=lam)).problem
+            except ValueError as error:
+                tally.cases += 1
+                misses.append(f"seed {case.seed}: {error}; {case.about}")
+                continue
+            ours, costs = compare(case, problem, kind, starts)
             best = min(ours.cost, costs.min())
             excess = ours.cost / best - 1
             tally.cases += 1
@@ -176,6 +185,33 @@ def measure(
                     f"the best, {ours.status} after {ours.steps} steps; {case.about}"
                 )
     return tallies, misses
+
+
+def damaged(model: fa.FaceModel, x: np.ndarray) -> dict[str, np.ndarray]:
+    """The points (68, 2) as drawn, turned by half, and three ways to get them wrong."""
+    mean = model.mean[model.scheme("ibug68").vertices]
+    partner = np.linalg.norm(mean[:, None] - mean * [-1, 1, 1], axis=2).argmin(axis=0)
+    return {
+        "as drawn": x,
+        "left and right exchanged": x[partner],
+        "picture mirrored": x * [-1, 1] + [SIDE, 0],
+        "y upward": x * [1, -1] + [0, SIDE],
+        "picture upside down": SIDE - x,
+    }
+
+
+def refusals(model: fa.FaceModel, cases: Iterator[Case]) -> dict[str, list[int]]:
+    """[refused, all] by what was done to the points."""
+    counts: dict[str, list[int]] = {}
+    for case in cases:
+        for name, x in damaged(model, case.observation.points).items():
+            count = counts.setdefault(name, [0, 0])
+            count[1] += 1
+            try:
+                prepare(model, fa.Observation(x, "ibug68", (SIDE, SIDE)), fa.FitOptions())
+            except ValueError:
+                count[0] += 1
+    return counts
 
 
 def main() -> int:
@@ -214,14 +250,31 @@ def main() -> int:
         }
         if not options.json:
             print_table(f"{model.name}, {title}", tallies, misses)
+    wanted = {
+        "all points": some(n, 0),
+        **{f"{few} points": some(n, 10_000 * few, points=few) for few in FEW},
+        "profile, yaw 75 to 90": some(n, 200_000, yaw=(75.0, 90.0)),
+    }
+    refused = {title: refusals(model, cases()) for title, cases in wanted.items()}
+    result["refused"] = refused
     if options.json:
         print(json.dumps(result))
-    return int(options.check and share < PROMISED)
+    else:
+        print(f"\n{model.name}, refused as seen from behind")
+        for title, counts in refused.items():
+            print(f"{title:<30}", ", ".join(f"{k} {a} of {b}" for k, (a, b) in counts.items()))
+    wrong = any(
+        count != (0 if name in RIGHT else cases)
+        for name, (count, cases) in refused["all points"].items()
+    )
+    return int(options.check and (share < PROMISED or wrong))
 
 
 def print_table(title: str, tallies: dict[tuple[str, float], Tally], misses: list[str]) -> None:
     print(f"\n{title}")
-    print("fit           lambda  found         share %  converged  steps  largest excess  other starts %")
+    print(
+        "fit           lambda  found         share %  converged  steps  largest excess  other starts %"
+    )
     for (kind, lam), t in tallies.items():
         print(
             f"{kind:<13} {lam:>6g}  {t.found:>5} of {t.cases:<5} {100 * t.found / t.cases:7.2f}"
