@@ -89,7 +89,7 @@ class Fit:
     prior_weight: float  # lambda, px^2
     interocular_px: float  # the distance d_L is a percentage of
     interocular_meaning: str
-    steps: int
+    steps: int  # of the solver; rounds of method="als"
     status: Status  # "converged" only if the projected gradient says so
 
     def __post_init__(self) -> None:
