@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from .arrays import Array, checked, read_only
 from .camera import depths
 from .fitting import FARTHEST, NEAREST, Fit, FitOptions, prepare, solve_from, start_pose
+from .fitting.result import Jacobian, Method, Weighting
 from .metrics import HUMAN_TOLERANCE_PERCENT
 from .model import FaceModel
 from .observation import Observation
@@ -92,9 +93,16 @@ def sweep_distance(
     prior_weight: float | None = None,
     tolerance: float = 1e-8,
     max_steps: int = 100,
+    weighting: Weighting = "reprojection",
+    method: Method = "joint",
+    jacobian: Jacobian = "kaufman",
+    als_rounds: int | None = 10,
 ) -> Sweep:
     """Fits at every distance (D,), metres (default: 49 from 0.2 to 3 m), and orthographic; options as `fit`."""
-    options = FitOptions(modes, box, noise_percent, prior_weight, tolerance, max_steps)
+    options = FitOptions(
+        modes, box, noise_percent, prior_weight, tolerance, max_steps,
+        weighting, method, jacobian, als_rounds,
+    )  # fmt: skip
     grid = (
         np.geomspace(*GRID)
         if distances is None

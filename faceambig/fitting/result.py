@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -13,6 +14,10 @@ from ..metrics import mean_gap_percent
 from ..model import FaceModel
 from ..observation import Observation
 
+Weighting = Literal["reprojection", "algebraic"]
+Method = Literal["joint", "snls", "als"]
+Jacobian = Literal["kaufman", "full"]
+
 
 class Status(StrEnum):
     """How a fit ended; only CONVERGED is a result to rely on."""
@@ -21,7 +26,8 @@ class Status(StrEnum):
         "converged"  # the projected gradient vanishes: no step inside the box lowers the cost
     )
     MAX_STEPS = "step limit reached"
-    STALLED = "no further decrease"  # rounding stopped the descent before the gradient vanished
+    STALLED = "no further decrease"  # the descent came to rest before the gradient vanished
+    ROUNDS = "stopped after the given rounds"  # als_rounds of them, short of the optimum
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +42,10 @@ class FitOptions:
     prior_weight: float | None = None  # lambda in px^2 itself, instead of noise_percent
     tolerance: float = 1e-8  # relative cost above the optimum that still counts as converged
     max_steps: int = 100
+    weighting: Weighting = "reprojection"  # of a landmark's residual
+    method: Method = "joint"  # the solver, see `fit`
+    jacobian: Jacobian = "kaufman"  # of the projected residual of SNLS
+    als_rounds: int | None = 10  # rounds of method="als"; None: until a round gains nothing
 
     def __post_init__(self) -> None:
         if self.modes < 1:
@@ -50,6 +60,15 @@ class FitOptions:
             raise ValueError(f"tolerance: {self.tolerance:g} is not within 1e-14 to 0.01")
         if self.max_steps < 1:
             raise ValueError(f"max_steps: {self.max_steps} is not at least 1")
+        for name, kind in (("weighting", Weighting), ("method", Method), ("jacobian", Jacobian)):
+            if (value := getattr(self, name)) not in get_args(kind):
+                raise ValueError(f"{name}: {value!r} is not {' or '.join(get_args(kind))}")
+        if self.als_rounds is not None and self.als_rounds < 1:
+            raise ValueError(f"als_rounds: {self.als_rounds} is not at least 1")
+        if self.weighting == "algebraic" and self.method == "als":
+            raise ValueError(
+                "method: 'als' has no algebraic weighting; leave method out and SNLS solves it"
+            )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,11 +85,11 @@ class Fit:
     focal: float | None  # pixels; None if orthographic
     scale: float | None  # pixels per metre if orthographic, else None
     residual: Array  # (L, 2) observed minus projected, pixels; NaN where not visible
-    cost: float  # E of MATH.md 3: squared pixels, prior included, no factor 1/2
+    cost: float  # E of MATH.md 3: squared pixels, prior included, no factor 1/2; whatever the method and weighting
     prior_weight: float  # lambda, px^2
     interocular_px: float  # the distance d_L is a percentage of
     interocular_meaning: str
-    steps: int
+    steps: int  # of the solver; rounds of method="als"
     status: Status  # "converged" only if the projected gradient says so
 
     def __post_init__(self) -> None:
