@@ -174,13 +174,15 @@ def follow(task: Task, kappas: Sequence[float], first: Fit) -> list[Fit]:
 
 def path_speed(fit: Fit) -> float:
     """Speed of the face along the path through `fit`, mm of mean surface movement per doubling of the distance."""
-    task = prepare(fit.model, fit.observation, fit.options)
-    S = len(fit.alpha)
-    velocity = tangent(task.problem, fit.camera, fit.alpha)[:S]
-    model = fit.model
-    flat = model.control_modes.reshape(-1, model.n_modes)[:, :S]
-    shape, moved = (model.refine((flat @ a).reshape(-1, 3)) for a in (fit.alpha, velocity))
-    shape = shape + model.mean
+    task, model, S = prepare(fit.model, fit.observation, fit.options), fit.model, len(fit.alpha)
+    both = np.zeros(
+        (model.n_modes, 2)
+    )  # one product of all modes is faster than two of a part of their columns
+    both[:S, 0] = fit.alpha
+    both[:S, 1] = tangent(task.problem, fit.camera, fit.alpha)[:S]
+    changes = (model.control_modes.reshape(-1, model.n_modes) @ both).reshape(-1, 6)
+    surface = model.refine(changes).reshape(-1, 3, 2)
+    shape, moved = model.mean + surface[:, :, 0], surface[:, :, 1]
     if model.evaluation is not None:
         shape, moved = shape[model.evaluation], moved[model.evaluation]
     # The rigid velocity moved - (a + w x shape) of least squares: Procrustes to first order
