@@ -12,10 +12,20 @@ Principal points c are subtracted at the border: below, pixels count from c.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from .arrays import Array, read_only
+
+
+class View(NamedTuple):
+    """The numbers of one camera, or of F of them stacked for one computation."""
+
+    R: Array  # (3, 3) or (F, 3, 3)
+    t: Array  # (2,) or (F, 1, 2)
+    s: Array | float  # or (F, 1)
+    kappa: Array | float  # or (F, 1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,6 +42,10 @@ class Camera:
         object.__setattr__(self, "t", read_only(self.t))
 
     @property
+    def view(self) -> View:
+        return View(self.R, self.t, self.s, self.kappa)
+
+    @property
     def focal(self) -> float | None:
         """f in pixels, None when orthographic."""
         return self.s / self.kappa if self.kappa > 0 else None
@@ -40,6 +54,30 @@ class Camera:
     def distance(self) -> float | None:
         """t_z in metres, None when orthographic."""
         return 1.0 / self.kappa if self.kappa > 0 else None
+
+
+class Seen(NamedTuple):
+    """Points as one camera sees them, or, with a leading axis F, many."""
+
+    q: Array  # (N, 3) R v, metres, camera axes, from the model's origin
+    z: Array  # (N,) s / (1 + kappa q_z), pixels per metre at the point
+    xy: Array  # (N, 2) pixels from the principal point
+    behind: (
+        Array | None
+    )  # () or (F,) True: a point is behind the camera and z, xy mean nothing; None: nowhere
+
+
+def see(view: View, points: Array) -> Seen:
+    """Equation U for points (N, 3) in one view, or (F, N, 3) in F."""
+    R, t, s, kappa = view
+    q = points @ R.swapaxes(-1, -2)
+    depth = 1.0 + kappa * q[..., 2]
+    behind = None
+    if depth.min() <= 0:
+        behind = depth.min(-1) <= 0
+        depth = np.where(depth > 0, depth, 1.0)
+    z = s / depth
+    return Seen(q, z, z[..., None] * (q[..., :2] + t), behind)
 
 
 def depths(camera: Camera, points: Array) -> Array:
@@ -66,30 +104,37 @@ def camera_points(camera: Camera, points: Array, distance: float | None = None) 
 def jacobian(camera: Camera, points: Array, modes: Array) -> Array:
     """d xhat / d (alpha, d, t_xy, log s, kappa) as (L, 2, S + 7) at points v (L, 3) with modes Q (L, 3, S).
 
-    d is a further rotation from the left, R <- exp([d]x) R, so that no formula is evaluated away from d = 0. With
-    z = s / (1 + kappa q_z) and D = z [[1, 0, -(kappa / s) x], [0, 1, -(kappa / s) y]] (MATH.md 1):
-    alpha D R Q; d -D [q]x; t_xy z I; log s xhat; kappa -(q_z z / s) xhat.
+    d is a further rotation from the left, R <- exp([d]x) R, so that no formula is evaluated away from d = 0.
     """
-    q = points @ camera.R.T
-    z = camera.s / (1.0 + camera.kappa * q[:, 2])  # (L,)
-    xy = z[:, None] * (q[:, :2] + camera.t)
-    tilt = (-camera.kappa / camera.s * z)[:, None] * xy  # (L, 2) third column of D
-    L, S = len(points), modes.shape[2]
-    J = np.zeros((L, 2, S + 7))
-    DR = z[:, None, None] * camera.R[:2] + tilt[:, :, None] * camera.R[2]
-    np.matmul(DR, modes, out=J[:, :, :S])
-    qx, qy, qz = q.T
-    pose = J[:, :, S:]
+    J = np.zeros((len(points), 2, modes.shape[2] + 7))
+    view = camera.view
+    fill_jacobian(J, view, see(view, points), modes)
+    return J
+
+
+def fill_jacobian(J: Array, view: View, seen: Seen, modes: Array) -> None:
+    """Write the derivative of (U) into the first S + 7 columns of J ([F,] L, 2, at least S + 7), zeros before.
+
+    With D = z [[1, 0, -(kappa / s) x], [0, 1, -(kappa / s) y]] (MATH.md 1): alpha D R Q; d -D [q]x; t_xy z I;
+    log s xhat; kappa -(q_z z / s) xhat.
+    """
+    R, _, s, kappa = view
+    S = modes.shape[-1]
+    q, z, xy, _ = seen
+    tilt = (z * (-kappa / s))[..., None] * xy  # third column of D
+    DR = z[..., None, None] * R[..., None, :2, :] + tilt[..., None] * R[..., None, 2:, :]
+    np.matmul(DR, modes, out=J[..., :S])
+    pose = J[..., S:]
+    z_q = z[..., None] * q
     # -D [q]x: column i is D (e_i x q), with
     # e_x x q = (0, -q_z, q_y), e_y x q = (q_z, 0, -q_x), e_z x q = (-q_y, q_x, 0)
-    pose[:, :, 0] = tilt * qy[:, None]
-    pose[:, 1, 0] -= z * qz
-    pose[:, :, 1] = -tilt * qx[:, None]
-    pose[:, 0, 1] += z * qz
-    pose[:, 0, 2] = -z * qy
-    pose[:, 1, 2] = z * qx
-    pose[:, 0, 3] = z
-    pose[:, 1, 4] = z
-    pose[:, :, 5] = xy
-    pose[:, :, 6] = (-(qz * z) / camera.s)[:, None] * xy
-    return J
+    np.multiply(tilt, q[..., 1:2], out=pose[..., 0])
+    pose[..., 1, 0] -= z_q[..., 2]
+    np.multiply(tilt, -q[..., 0:1], out=pose[..., 1])
+    pose[..., 0, 1] += z_q[..., 2]
+    pose[..., 0, 2] = -z_q[..., 1]
+    pose[..., 1, 2] = z_q[..., 0]
+    pose[..., 0, 3] = z
+    pose[..., 1, 4] = z
+    pose[..., 5] = xy
+    np.multiply((z_q[..., 2] / -s)[..., None], xy, out=pose[..., 6])

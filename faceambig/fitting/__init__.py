@@ -15,7 +15,7 @@ from ..observation import FLATTEST, MIN_POINTS, Observation, eye_distance
 from ..rotation import R0, axis_angle
 from .result import Fit, FitOptions, Status
 from .solve import Problem, Solution, solve
-from .start import pose_from_points
+from .start import centred_pinv, pose_from_points
 
 __all__ = ["Fit", "FitOptions", "Status", "fit"]
 
@@ -89,11 +89,12 @@ def prepare(model: FaceModel, observation: Observation, options: FitOptions) -> 
         raise ValueError(f"observation: {shown(observation)} is not an Observation")
     visible = observation.visible
     vertices = observation.vertices(model)
-    mean, Q = landmark_rows(model, tuple(vertices[visible].tolist()))
-    Q = np.ascontiguousarray(Q[:, :, : options.modes_of(model)])
+    mean, pinv, Q = landmark_rows(model, tuple(vertices[visible].tolist()), options.modes_of(model))
     points = observation.points[visible] - observation.centre
     weights = np.ones(len(points)) if observation.weights is None else observation.weights[visible]
-    problem = Problem(points, weights, mean, Q, 0.0, np.inf if options.box is None else options.box)
+    problem = Problem(
+        points, weights, mean, pinv, Q, 0.0, np.inf if options.box is None else options.box
+    )
     interocular, meaning = _interocular(model, observation, problem)
     lam = options.prior_weight
     if lam is None:
@@ -106,8 +107,13 @@ def prepare(model: FaceModel, observation: Observation, options: FitOptions) -> 
 
 
 @lru_cache(maxsize=64)
-def landmark_rows(model: FaceModel, vertices: tuple[int, ...]) -> tuple[Array, Array]:
-    """Mean (L, 3) and modes (L, 3, S) at landmark vertices, kept: a sweep or a page asks for the same ones again."""
+def landmark_rows(
+    model: FaceModel, vertices: tuple[int, ...], n_modes: int
+) -> tuple[Array, Array, Array]:
+    """Mean (L, 3), its pseudo-inverse for the start (3, L) and modes (L, 3, S) at landmark vertices.
+
+    Kept: a sweep, a batch or a page asks for the same ones again.
+    """
     mean, modes = model.rows(np.array(vertices, dtype=np.intp))
     different = len(set(vertices))
     if 1 < different < MIN_POINTS:  # one alone is a line, below
@@ -119,15 +125,13 @@ def landmark_rows(model: FaceModel, vertices: tuple[int, ...]) -> tuple[Array, A
         raise ValueError(
             "points: on the model they lie on one line, no pose can be found; add a point off the line"
         )
-    return read_only(mean), read_only(modes)
+    modes = np.ascontiguousarray(modes[:, :, :n_modes])
+    return read_only(mean), read_only(centred_pinv(mean)), read_only(modes)
 
 
 def start_pose(problem: Problem, kappa: float) -> Camera:
     """The closed-form pose of the mean face at kappa = 1 / t_z."""
-    centred = problem.mean - problem.mean.mean(axis=0)
-    # The pseudo-inverse of the 3 x 3 normal matrix, not of the L x 3 one: landmarks in one plane are allowed
-    pinv = np.linalg.pinv(centred.T @ centred, hermitian=True) @ centred.T
-    return pose_from_points(problem.points, problem.mean, pinv, kappa)
+    return pose_from_points(problem.points, problem.mean, problem.mean_pinv, kappa)
 
 
 def solve_from(task: Task, camera: Camera, alpha: Array, free_distance: bool = False) -> Fit:
@@ -198,7 +202,7 @@ def _answer(task: Task, solution: Solution) -> Fit:
         scale=None if perspective else camera.s,
         residual=residual,
         cost=solution.cost,
-        prior_weight=problem.prior_weight,
+        prior_weight=float(problem.prior_weight),
         interocular_px=task.interocular_px,
         interocular_meaning=task.interocular_meaning,
         steps=solution.steps,

@@ -17,31 +17,36 @@ BLOCK_TRIES = 3  # rounds without fewer violations before exchanging one at a ti
 
 
 def solve_box_qp(
-    H: Array, g: Array, low: Array, high: Array, active: np.ndarray, max_rounds: int
+    H: Array,
+    g: Array,
+    low: Array,
+    high: Array,
+    active: np.ndarray,
+    max_rounds: int,
+    factors: dict[bytes, Array] | None = None,
 ) -> tuple[Array, np.ndarray, bool]:
     """(d, active, solved): minimiser (n,), which bounds hold (-1, 0, 1), and whether it is exact.
 
-    `active` (n,) is the guess to start from, e.g. the last step's. Not solved within `max_rounds`: d is clipped to the
-    box, feasible but not optimal.
+    `active` (n,) int8 is the guess to start from, e.g. the last step's. Not solved within `max_rounds`: d is clipped to
+    the box, feasible but not optimal. `factors` keeps what was factored of H, for another g or other bounds.
     """
+    factors = {} if factors is None else factors
     n, scale = len(g), 1e-12 * float(np.abs(g).max(initial=1e-300))
     fewest, tries = n + 1, BLOCK_TRIES
     d = np.zeros(n)
     for _ in range(max_rounds):
-        free = active == FREE
-        if free.all():
-            d = _solve(H, g)
-            below, above, leave = d < low, d > high, ~free
-        else:
-            d = np.where(active == AT_LOW, low, np.where(active == AT_HIGH, high, 0.0))
-            rows = H[free]
-            d[free] = _solve(rows[:, free], g[free] - rows @ d)
+        if active.any():
+            free = active == FREE
+            chosen = free.nonzero()[0]
+            d = np.where(free, 0.0, np.where(active > 0, high, low))
+            slope = g - H @ d
+            d[chosen] = _solve(H, chosen, slope[chosen], chosen.tobytes(), factors)
             slope = g - H @ d  # > 0: a larger d_j would lower the cost
-            below, above = free & (d < low), free & (d > high)
-            leave = ((active == AT_LOW) & (slope > scale)) | (
-                (active == AT_HIGH) & (slope < -scale)
-            )
-        wrong = below | above | leave
+            room = np.minimum(d - low, high - d)
+            wrong = np.where(free, room, active * slope + scale) < 0
+        else:
+            d = _solve(H, None, g, b"", factors)
+            wrong = (d < low) | (d > high)
         count = int(np.count_nonzero(wrong))
         if count == 0:
             return d, active, True
@@ -53,18 +58,23 @@ def solve_box_qp(
             last = int(np.flatnonzero(wrong)[-1])
             wrong = np.zeros(n, dtype=bool)
             wrong[last] = True
-        active = active.copy()
-        active[wrong & below] = AT_LOW
-        active[wrong & above] = AT_HIGH
-        active[wrong & leave] = FREE
+        # Bounds that hold against the slope are given up, variables out of the box held
+        beyond = (d > high).astype(np.int8) - (d < low)
+        active = np.where(wrong, np.where(active, FREE, beyond), active)
     return np.clip(d, low, high), active, False
 
 
-def _solve(H: Array, g: Array) -> Array:
+def _solve(
+    H: Array, chosen: np.ndarray | None, g: Array, name: bytes, factors: dict[bytes, Array]
+) -> Array:
+    """Solution for the chosen variables (None: all) by Cholesky, the factor taken from or put under `name`."""
     if not len(g):  # every variable on a bound
         return g
-    # H.T of a C-ordered symmetric matrix is the Fortran order LAPACK wants: no transposed copy
-    _, d, info = lapack.dposv(H.T, g)
-    if info != 0:
-        raise np.linalg.LinAlgError(f"leading minor {info} is not positive definite")
-    return d
+    if name not in factors:
+        part = H if chosen is None else H.take(chosen, 0).take(chosen, 1)
+        # .T of a C-ordered symmetric matrix is the Fortran order LAPACK wants: no transposed copy
+        factor, info = lapack.dpotrf(part.T, clean=0)
+        if info != 0:
+            raise np.linalg.LinAlgError(f"leading minor {info} is not positive definite")
+        factors[name] = factor
+    return lapack.dpotrs(factors[name], g)[0]

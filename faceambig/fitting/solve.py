@@ -7,18 +7,24 @@ g = J^T e - lambda alpha, the box QP of the linearised problem, then backtrackin
 every point of it is feasible). Eliminating the linear unknowns from this step *is* Kaufman's step of the paper's SNLS.
 
 Damping mu stays 0 unless steps shorter than 0.3 are needed. Convergence is tested only with mu = 0 and the QP solved:
-a small predicted decrease under damping was once taken for convergence 3e-4 above the optimum (MATH.md 3 b).
+a small predicted decrease under damping was once taken for convergence 3e-4 above the optimum (MATH.md 3 b). Near the
+optimum H hardly changes: the last steps keep it and renew g alone, which needs no J (a fifth of the time of a fit).
+
+`descent` is the method and asks for what it needs: the cost at a trial, H and g at a point. `solve` answers for one
+face, `batch.solve_together` for many at once, so both give the same fits.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple
+import math
+from collections.abc import Generator
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..arrays import Array
-from ..camera import Camera, depths, jacobian, project
+from ..camera import Camera, Seen, View, fill_jacobian, see
 from ..rotation import rotation_matrix
 from .boxqp import solve_box_qp
 from .result import Status
@@ -32,19 +38,35 @@ FIRST_DAMPING, MORE_DAMPING = 1e-5, 3.0
 POOR = 0.5  # share of the predicted decrease below which a shorter step is tried too
 LARGEST_TURN = 1.0  # radians a step; beyond, the linearised rotation says nothing
 QP_ROUNDS_EARLY, QP_ROUNDS = (2, 3, 4), 200  # far from the optimum the active set need not be exact
+LEAST_PRIOR = 1e-10  # px^2
+KEEP_H = 1e-2  # predicted decrease, of E, below which the next step keeps H ...
+SLOW = 0.1  # ... as long as each such step predicts less than this share of the last one's decrease
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Problem:
-    """One fit in the solver's own terms. L visible landmarks, S modes."""
+    """One fit in the solver's own terms. L visible landmarks, S modes.
+
+    Many fits at once have a leading axis F: points (F, L, 2), weights (F, L), prior_weight (F, 1).
+    """
 
     points: Array  # (L, 2) pixels from the principal point
     weights: Array  # (L,) > 0
     mean: Array  # (L, 3) metres
+    mean_pinv: Array  # (3, L), of the centred mean: for the start (start.py)
     modes: Array  # (L, 3, S), C-contiguous
-    prior_weight: float  # lambda, px^2
+    prior_weight: float | Array  # lambda, px^2
     box: float  # k, may be inf
     free_distance: bool = False
+    weighted: bool = field(init=False)  # not all weights are 1
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "weighted", bool((self.weights != 1).any()))
+
+    @property
+    def unknowns(self) -> int:
+        """n, the length of theta."""
+        return self.modes.shape[2] + POSE + self.free_distance
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,127 +84,136 @@ class Point(NamedTuple):
     """A face and a camera, and what they cost."""
 
     alpha: Array  # (S,)
-    camera: Camera
-    v: Array  # (L, 3) landmarks, metres
+    view: View
+    seen: Seen
     e: Array  # (L, 2) observed minus projected, pixels
     cost: float  # E of MATH.md 3, px^2; inf if a landmark is behind the camera
 
 
-def evaluate(problem: Problem, camera: Camera, alpha: Array) -> Point:
-    """The landmarks, residuals and cost of a face and a camera."""
-    S = len(alpha)
-    v = problem.mean + (problem.modes.reshape(-1, S) @ alpha).reshape(-1, 3)
-    if camera.kappa > 0 and depths(camera, v).min() <= 0:
-        return Point(alpha, camera, v, np.full_like(problem.points, np.nan), np.inf)
-    e = problem.points - project(camera, v)
-    E = problem.weights @ np.einsum("ij,ij->i", e, e) + problem.prior_weight * (alpha @ alpha)
-    return Point(alpha, camera, v, e, float(E))
+class Trial(NamedTuple):
+    """Asks for the Point a fraction of a step away."""
+
+    point: Point
+    delta: Array  # (n,)
+    length: float
 
 
-def cost(problem: Problem, camera: Camera, alpha: Array) -> float:
-    """E of MATH.md 3 in px^2; inf if a landmark is behind the camera."""
-    return evaluate(problem, camera, alpha).cost
+class Linearised(NamedTuple):
+    """Asks for (H, g) at a point."""
+
+    point: Point
 
 
-def solve(
-    problem: Problem, camera: Camera, alpha: Array, *, tolerance: float = 1e-8, max_steps: int = 100
-) -> Solution:
-    """The best face and camera from a start; `alpha` (S,) inside the box, `camera` in front of the face."""
-    point = evaluate(problem, camera, alpha)
-    if not np.isfinite(point.cost):
+class Gradient(NamedTuple):
+    """Asks for g alone."""
+
+    point: Point
+
+
+Request = Trial | Linearised | Gradient
+Descent = Generator[Request, Any, Solution]
+
+
+def descent(
+    problem: Problem, camera: Camera, alpha: Array, tolerance: float, max_steps: int
+) -> Descent:
+    """The method, from a start; yields what it wants to know and is sent the answer."""
+    point = evaluate(problem, camera.view, alpha)
+    if point.cost == np.inf:
         raise ValueError(
             "distance: a landmark lies behind the camera at the start; fit at a larger distance"
         )
-    n = len(alpha) + POSE + problem.free_distance
+    low_end, high_end, here = _ends(problem)
+    S, n = len(alpha), problem.unknowns
+    H, factors, keep, last = np.empty((0, 0)), {}, False, np.inf
+    # -1, 0, 1; a start on the box stays there unless its gradient says otherwise
     active, mu = np.zeros(n, dtype=np.int8), 0.0
+    active[:S] = (alpha >= problem.box).astype(np.int8) - (alpha <= -problem.box)
     # A noise-free picture can be explained exactly: then E itself is rounding, and no relative test ever holds
     largest = float(np.abs(problem.points).max())
     rounding = float(problem.weights.sum()) * (10 * np.finfo(float).eps * largest) ** 2
     for step in range(1, max_steps + 1):
-        H, g = _normal_equations(problem, point, n)
-        low, high = _bounds(problem, point, n)
+        if keep:
+            g = yield Gradient(point)
+        else:
+            H, g = yield Linearised(point)
+            factors = {}
+        here[:S] = point.alpha
+        if problem.free_distance:
+            here[-1] = point.view.kappa
         damped = H + np.diag(mu * np.diag(H)) if mu > 0 else H
         rounds = QP_ROUNDS_EARLY[step - 1] if step <= len(QP_ROUNDS_EARLY) else QP_ROUNDS
         try:
-            delta, active, solved = solve_box_qp(damped, g, low, high, active, rounds)
+            delta, active, solved = solve_box_qp(
+                damped, g, low_end - here, high_end - here, active, rounds, factors
+            )
         except np.linalg.LinAlgError:  # a bad point of the curved valley: damp and try again
             mu, active = max(FIRST_DAMPING, MORE_DAMPING * mu), np.zeros(n, dtype=np.int8)
+            keep = False
             continue
-        slope = float(2 * (g @ delta))
+        slope = 2 * float(g @ delta)
         predicted = slope - float(delta @ (H @ delta))
         if mu == 0 and solved and predicted <= 0.1 * tolerance * point.cost + rounding:
-            return Solution(point.alpha, point.camera, point.cost, step, Status.CONVERGED)
-        moved = _line_search(problem, point, delta, slope)
+            return _solution(problem, point, step, Status.CONVERGED)
+        moved = yield from _line_search(point, delta, slope)
         if moved is None:
+            if keep:
+                keep = False
+                continue
             if mu > 1e3 or (mu == 0 and solved and predicted <= 1e-12 * point.cost):
-                return Solution(point.alpha, point.camera, point.cost, step, Status.STALLED)
+                return _solution(problem, point, step, Status.STALLED)
             mu = max(FIRST_DAMPING, 10 * MORE_DAMPING * mu)
             continue
         point, length = moved
+        whole = mu == 0 and solved and length == 1.0
+        keep = whole and predicted <= KEEP_H * point.cost and not (keep and predicted > SLOW * last)
+        last = predicted
         if length < SHORT_STEP:
             mu = max(FIRST_DAMPING, MORE_DAMPING * mu)
         else:
             mu = mu / 10 if mu > FIRST_DAMPING else 0.0
-    return Solution(point.alpha, point.camera, point.cost, max_steps, Status.MAX_STEPS)
+    return _solution(problem, point, max_steps, Status.MAX_STEPS)
 
 
-def _normal_equations(problem: Problem, point: Point, n: int) -> tuple[Array, Array]:
-    """H = J^T W J + lambda I_alpha (n, n) and g = J^T W e - lambda alpha (n,), in px^2."""
-    S, lam = len(point.alpha), problem.prior_weight
-    J, e = jacobian(point.camera, point.v, problem.modes)[:, :, :n], point.e
-    if (problem.weights != 1).any():
-        root = np.sqrt(problem.weights)
-        J, e = J * root[:, None, None], e * root[:, None]
-    flat = np.ascontiguousarray(J).reshape(
-        -1, n
-    )  # one array on both sides of the product: half the work
-    H, g = flat.T @ flat, flat.T @ e.ravel()
-    # Without a prior the unseen modes have no curvature at all (MATH.md 8.9)
-    H.flat[: S * (n + 1) : n + 1] += max(lam, 1e-10)
-    g[:S] -= lam * point.alpha
-    return H, g
+def _solution(problem: Problem, point: Point, steps: int, status: Status) -> Solution:
+    # A step to the bound may pass it by a rounding
+    alpha = point.alpha.clip(-problem.box, problem.box)
+    return Solution(alpha, _camera(point.view), point.cost, steps, status)
 
 
-def _bounds(problem: Problem, point: Point, n: int) -> tuple[Array, Array]:
-    """Lowest and highest step (n,) that stays inside the box and between infinity and the nearest distance."""
-    S = len(point.alpha)
+def _ends(problem: Problem) -> tuple[Array, Array, Array]:
+    """Lowest and highest theta (n,), the box and the distances between infinity and the nearest; and zeros (n,)."""
+    S, n = problem.modes.shape[2], problem.unknowns
     low, high = np.full(n, -np.inf), np.full(n, np.inf)
-    low[:S], high[:S] = -problem.box - point.alpha, problem.box - point.alpha
+    low[:S], high[:S] = -problem.box, problem.box
     if problem.free_distance:
-        low[-1], high[-1] = -point.camera.kappa, NEAREST_KAPPA - point.camera.kappa
-    return low, high
+        low[-1], high[-1] = 0.0, NEAREST_KAPPA
+    return low, high, np.zeros(n)
 
 
 def _line_search(
-    problem: Problem, point: Point, delta: Array, slope: float
-) -> tuple[Point, float] | None:
+    point: Point, delta: Array, slope: float
+) -> Generator[Trial, Point, tuple[Point, float] | None]:
     """The point a fraction of `delta` away that lowers E, and the fraction, or None.
 
     `slope` is -dE/dlength at 0. Lengths follow the parabola through E(0), E'(0), E(length), kept within 0.15 to 0.7
     of the last.
     """
     S, E = len(point.alpha), point.cost
-    turn = float(np.linalg.norm(delta[S : S + 3]))
+    turn = math.hypot(*delta[S : S + 3].tolist())
     length = min(1.0, LARGEST_TURN / turn) if turn > 0 else 1.0
     for _ in range(30):
-        new = _at(problem, point, delta, length)
+        new = yield Trial(point, delta, length)
         if new.cost <= E - 1e-4 * length * slope:
             if E - new.cost < POOR * 0.5 * length * slope:
                 # Residuals too large for Gauss-Newton: whole steps would zig-zag across the valley for ever
-                other = _at(problem, point, delta, _parabola(E, slope, new.cost, length))
+                other = yield Trial(point, delta, _parabola(E, slope, new.cost, length))
                 if other.cost < new.cost:
                     return other, length
             return new, length
-        finite = np.isfinite(new.cost)
-        length = _parabola(E, slope, new.cost, length) if finite else 0.15 * length
+        seen = new.cost < np.inf
+        length = _parabola(E, slope, new.cost, length) if seen else 0.15 * length
     return None
-
-
-def _at(problem: Problem, point: Point, delta: Array, length: float) -> Point:
-    """The point a fraction of `delta` away, inside the box."""
-    S = len(point.alpha)
-    alpha = (point.alpha + length * delta[:S]).clip(-problem.box, problem.box)
-    return evaluate(problem, moved_camera(point.camera, length * delta[S:]), alpha)
 
 
 def _parabola(E: float, slope: float, E_new: float, length: float) -> float:
@@ -192,27 +223,123 @@ def _parabola(E: float, slope: float, E_new: float, length: float) -> float:
     return length * min(0.7, max(0.15, factor))
 
 
+def moved_view(view: View, step: Array) -> View:
+    """`view` after a step (d, t_xy, log s[, kappa]), (6,) or (7,)."""
+    R, t, s, kappa = view
+    if len(step) > POSE:
+        kappa = max(0.0, kappa + float(step[POSE]))
+    return View(rotation_matrix(step[:3]) @ R, t + step[3:5], s * math.exp(step[5]), kappa)
+
+
 def moved_camera(camera: Camera, step: Array) -> Camera:
     """`camera` after a step (d, t_xy, log s[, kappa]), (6,) or (7,)."""
-    kappa = camera.kappa + step[6] if len(step) > 6 else camera.kappa
-    return Camera(
-        rotation_matrix(step[:3]) @ camera.R,
-        camera.t + step[3:5],
-        camera.s * float(np.exp(step[5])),
-        max(0.0, kappa),
+    return _camera(moved_view(camera.view, step))
+
+
+def _camera(view: View) -> Camera:
+    return Camera(view.R, view.t, float(view.s), float(view.kappa))
+
+
+def solve(
+    problem: Problem, camera: Camera, alpha: Array, *, tolerance: float = 1e-8, max_steps: int = 100
+) -> Solution:
+    """The best face and camera from a start; `alpha` (S,) inside the box, `camera` in front of the face."""
+    work = descent(problem, camera, alpha, tolerance, max_steps)
+    request = next(work)
+    while True:
+        try:
+            request = work.send(_answer(problem, request))
+        except StopIteration as end:
+            return end.value
+
+
+def _answer(problem: Problem, request: Request) -> Any:
+    match request:
+        case Trial(point, delta, length):
+            S, step = len(point.alpha), length * delta
+            return evaluate(problem, moved_view(point.view, step[S:]), point.alpha + step[:S])
+        case Linearised((alpha, view, seen, e, _)):
+            return normal_equations(problem, alpha, view, seen, e)
+        case Gradient((alpha, view, seen, e, _)):
+            return gradient(problem, alpha, view, seen, e)
+
+
+def evaluate(problem: Problem, view: View, alpha: Array) -> Point:
+    """The landmarks, residuals and cost of a face and a camera."""
+    seen, e, E = residuals(problem, alpha, view)
+    return Point(alpha, view, seen, e, float(E))
+
+
+def residuals(problem: Problem, alpha: Array, view: View) -> tuple[Seen, Array, Array]:
+    """(seen, e (..., L, 2), E (...)) of faces alpha (..., S) in views: the landmarks seen, residuals and costs."""
+    S = alpha.shape[-1]
+    v = problem.mean.ravel() + alpha @ problem.modes.reshape(-1, S).T
+    seen = see(view, v.reshape(*alpha.shape[:-1], -1, 3))
+    e = problem.points - seen.xy
+    flat = e.reshape(*alpha.shape[:-1], -1)
+    weighted = (
+        flat if not problem.weighted else (problem.weights[..., None] * e).reshape(flat.shape)
     )
+    E = np.vecdot(weighted, flat) + np.vecdot(problem.prior_weight * alpha, alpha)
+    return seen, e, E if seen.behind is None else np.where(seen.behind, np.inf, E)
+
+
+def normal_equations(
+    problem: Problem, alpha: Array, view: View, seen: Seen, e: Array
+) -> tuple[Array, Array]:
+    """H = J^T W J + lambda I_alpha (..., n, n) and g = J^T W e - lambda alpha (..., n), in px^2."""
+    S, n = alpha.shape[-1], problem.unknowns
+    # e as the column after J gives g with H; whole cache lines, 8 columns, a tenth faster
+    columns = -(-(S + POSE + 2) // 8) * 8
+    J = np.zeros((*e.shape, columns))
+    fill_jacobian(J, view, seen, problem.modes)
+    J[..., n] = e
+    if problem.weighted:
+        J *= np.sqrt(problem.weights)[..., None, None]
+    rows = J.reshape(*alpha.shape[:-1], -1, columns)
+    product = rows.swapaxes(-1, -2) @ rows  # one array on both sides: half the work
+    diagonal = product.reshape(*alpha.shape[:-1], -1)[..., : S * (columns + 1) : columns + 1]
+    # Without a prior the unseen modes have no curvature at all (MATH.md 8.9)
+    diagonal += np.maximum(problem.prior_weight, LEAST_PRIOR)
+    g = product[..., n, :n]
+    g[..., :S] -= problem.prior_weight * alpha
+    return product[..., :n, :n], g
+
+
+def gradient(problem: Problem, alpha: Array, view: View, seen: Seen, e: Array) -> Array:
+    """g = J^T W e - lambda alpha (..., n) without J: each residual is carried back to the model (MATH.md 1)."""
+    S, n = alpha.shape[-1], problem.unknowns
+    q, z, xy, _ = seen
+    if problem.weighted:
+        e = problem.weights[..., None] * e
+    along = np.vecdot(xy, e)
+    De = np.empty_like(q)  # D^T e
+    np.multiply(z[..., None], e, out=De[..., :2])
+    np.multiply(z * (-view.kappa / view.s), along, out=De[..., 2])
+    g = np.empty((*alpha.shape[:-1], n))
+    g[..., :S] = (De @ view.R).reshape(*alpha.shape[:-1], -1) @ problem.modes.reshape(-1, S)
+    g[..., :S] -= problem.prior_weight * alpha
+    M = q.swapaxes(-1, -2) @ De  # torque, the sum of q x D^T e, is its antisymmetric part
+    g[..., S] = M[..., 1, 2] - M[..., 2, 1]
+    g[..., S + 1] = M[..., 2, 0] - M[..., 0, 2]
+    g[..., S + 2] = M[..., 0, 1] - M[..., 1, 0]
+    g[..., S + 3 : S + 5] = De[..., :2].sum(-2)
+    g[..., S + 5] = along.sum(-1)
+    if problem.free_distance:
+        g[..., S + 6] = -np.vecdot(q[..., 2] * z / view.s, along)
+    return g
 
 
 def kkt_error(problem: Problem, solution: Solution) -> float:
     """Largest violation of the optimality conditions, each scaled by sqrt(E H_jj): 0 at a constrained optimum."""
     S = len(solution.alpha)
-    n = S + POSE + problem.free_distance
-    point = evaluate(problem, solution.camera, solution.alpha)
-    H, g = _normal_equations(problem, point, n)
-    at_low, at_high = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
-    at_low[:S], at_high[:S] = solution.alpha <= -problem.box, solution.alpha >= problem.box
+    alpha, view, seen, e, _ = evaluate(problem, solution.camera.view, solution.alpha)
+    H, g = normal_equations(problem, alpha, view, seen, e)
+    low, high, theta = _ends(problem)
+    theta[:S] = solution.alpha
     if problem.free_distance:
-        at_low[-1] = solution.camera.kappa <= 0
-        at_high[-1] = solution.camera.kappa >= NEAREST_KAPPA
-    violated = np.where(at_low, np.maximum(g, 0), np.where(at_high, np.maximum(-g, 0), np.abs(g)))
+        theta[-1] = solution.camera.kappa
+    violated = np.where(
+        theta <= low, np.maximum(g, 0), np.where(theta >= high, np.maximum(-g, 0), np.abs(g))
+    )
     return float((violated / np.sqrt(np.maximum(solution.cost * np.diag(H), 1e-300))).max())

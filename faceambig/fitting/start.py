@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.linalg import lapack
 
 from ..arrays import Array
 from ..camera import Camera
@@ -16,13 +17,21 @@ def pose_from_points(points: Array, mean: Array, mean_pinv: Array, kappa: float)
     their cross product, so det R = +1 always. s is corrected for the depth of the landmarks at distance 1 / kappa.
     """
     x_mean, v_mean = points.mean(axis=0), mean.mean(axis=0)
-    U, sv, Vt = np.linalg.svd((mean_pinv @ (points - x_mean)).T, full_matrices=False)
+    # LAPACK itself: np.linalg.svd spends three times as long around it
+    U, sv, Vt, _ = lapack.dgesdd((mean_pinv @ (points - x_mean)).T, full_matrices=0)
     rows = U @ Vt
     R = np.vstack([rows, _cross(rows[0], rows[1])])
     q = R @ v_mean
     depth = 1.0 + kappa * q[2]
     s = float(sv.mean()) * depth
     return Camera(R, x_mean * depth / s - q[:2], s, kappa)
+
+
+def centred_pinv(mean: Array) -> Array:
+    """(3, L) pseudo-inverse of the centred landmarks (L, 3): of every start with the same landmarks."""
+    centred = mean - mean.mean(axis=0)
+    # Of the 3 x 3 normal matrix, not of the L x 3 one: landmarks in one plane are allowed
+    return np.linalg.pinv(centred.T @ centred, hermitian=True) @ centred.T
 
 
 def _cross(a: Array, b: Array) -> Array:
