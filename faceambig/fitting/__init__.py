@@ -15,7 +15,7 @@ from ..observation import FLATTEST, MIN_POINTS, Observation, eye_distance
 from ..rotation import R0, axis_angle
 from .result import Fit, FitOptions, Status
 from .solve import Problem, Solution, solve
-from .start import centred_pinv, pose_from_points
+from .start import centred_pinv, pose_from_points, refuse_face_from_behind
 
 __all__ = ["Fit", "FitOptions", "Status", "fit"]
 
@@ -54,7 +54,8 @@ def fit(
 
     Raises
     ------
-    ValueError: an argument out of range, or points that do not belong to the model.
+    ValueError: an argument out of range, points that do not belong to the model, or that show the face from behind, as
+        with left and right exchanged, in a mirrored picture or with y counted upward.
 
     Notes
     -----
@@ -95,6 +96,7 @@ def prepare(model: FaceModel, observation: Observation, options: FitOptions) -> 
     problem = Problem(
         points, weights, mean, pinv, Q, 0.0, np.inf if options.box is None else options.box
     )
+    refuse_face_from_behind(problem, start_pose(problem, 0.0))
     interocular, meaning = _interocular(model, observation, problem)
     lam = options.prior_weight
     if lam is None:

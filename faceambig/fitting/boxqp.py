@@ -7,6 +7,8 @@ three rounds without progress one variable is exchanged at a time (Murty's least
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from scipy.linalg import lapack
 
@@ -24,29 +26,35 @@ def solve_box_qp(
     active: np.ndarray,
     max_rounds: int,
     factors: dict[bytes, Array] | None = None,
+    *,
+    there: bool = False,
 ) -> tuple[Array, np.ndarray, bool]:
     """(d, active, solved): minimiser (n,), which bounds hold (-1, 0, 1), and whether it is exact.
 
     `active` (n,) int8 is the guess to start from, e.g. the last step's. Not solved within `max_rounds`: d is clipped to
-    the box, feasible but not optimal. `factors` keeps what was factored of H, for another g or other bounds.
+    the box, feasible but not optimal. `factors` keeps what was factored of H, for another g or other bounds. `there`
+    says that d = 0 lies on every bound of the guess.
     """
     factors = {} if factors is None else factors
-    n, scale = len(g), 1e-12 * float(np.abs(g).max(initial=1e-300))
+    n, scale = len(g), 1e-12 * math.sqrt(g @ g) + 1e-300
     fewest, tries = n + 1, BLOCK_TRIES
     d = np.zeros(n)
     for _ in range(max_rounds):
-        if active.any():
-            free = active == FREE
-            chosen = free.nonzero()[0]
-            d = np.where(free, 0.0, np.where(active > 0, high, low))
-            slope = g - H @ d
-            d[chosen] = _solve(H, chosen, slope[chosen], chosen.tobytes(), factors)
+        free = active == FREE
+        chosen = free.nonzero()[0]
+        if len(chosen) < n:
+            pull = g
+            if not there:
+                d = np.where(free, 0.0, np.where(active > 0, high, low))
+                pull = g - H @ d
+            d[chosen] = _solve(H, chosen, pull[chosen], chosen.tobytes(), factors)
             slope = g - H @ d  # > 0: a larger d_j would lower the cost
             room = np.minimum(d - low, high - d)
             wrong = np.where(free, room, active * slope + scale) < 0
         else:
             d = _solve(H, None, g, b"", factors)
             wrong = (d < low) | (d > high)
+        there = False
         count = int(np.count_nonzero(wrong))
         if count == 0:
             return d, active, True

@@ -38,6 +38,7 @@ FIRST_DAMPING, MORE_DAMPING = 1e-5, 3.0
 POOR = 0.5  # share of the predicted decrease below which a shorter step is tried too
 LARGEST_TURN = 1.0  # radians a step; beyond, the linearised rotation says nothing
 QP_ROUNDS_EARLY, QP_ROUNDS = (2, 3, 4), 200  # far from the optimum the active set need not be exact
+EPS = float(np.finfo(float).eps)
 LEAST_PRIOR = 1e-10  # px^2
 KEEP_H = 1e-2  # predicted decrease, of E, below which the next step keeps H ...
 SLOW = 0.1  # ... as long as each such step predicts less than this share of the last one's decrease
@@ -125,13 +126,15 @@ def descent(
         )
     low_end, high_end, here = _ends(problem)
     S, n = len(alpha), problem.unknowns
-    H, factors, keep, last = np.empty((0, 0)), {}, False, np.inf
+    H, factors, last = np.empty((0, 0)), {}, np.inf
+    keep, whole = False, True  # whole: the last step ended on the bounds that are active
     # -1, 0, 1; a start on the box stays there unless its gradient says otherwise
     active, mu = np.zeros(n, dtype=np.int8), 0.0
     active[:S] = (alpha >= problem.box).astype(np.int8) - (alpha <= -problem.box)
     # A noise-free picture can be explained exactly: then E itself is rounding, and no relative test ever holds
-    largest = float(np.abs(problem.points).max())
-    rounding = float(problem.weights.sum()) * (10 * np.finfo(float).eps * largest) ** 2
+    rounding = (10 * EPS) ** 2 * float(np.vdot(problem.points, problem.points))
+    if problem.weighted:
+        rounding *= float(problem.weights.max())
     for step in range(1, max_steps + 1):
         if keep:
             g = yield Gradient(point)
@@ -145,18 +148,22 @@ def descent(
         rounds = QP_ROUNDS_EARLY[step - 1] if step <= len(QP_ROUNDS_EARLY) else QP_ROUNDS
         try:
             delta, active, solved = solve_box_qp(
-                damped, g, low_end - here, high_end - here, active, rounds, factors
+                damped, g, low_end - here, high_end - here, active, rounds, factors, there=whole
             )
         except np.linalg.LinAlgError:  # a bad point of the curved valley: damp and try again
             mu, active = max(FIRST_DAMPING, MORE_DAMPING * mu), np.zeros(n, dtype=np.int8)
-            keep = False
+            keep = whole = False
             continue
         slope = 2 * float(g @ delta)
         predicted = slope - float(delta @ (H @ delta))
-        if mu == 0 and solved and predicted <= 0.1 * tolerance * point.cost + rounding:
+        if mu == 0 and solved and predicted <= tolerance * point.cost + rounding:
+            if predicted > 0.1 * tolerance * point.cost + rounding:  # the step is known: take it
+                new = yield Trial(point, delta, 1.0)
+                point = new if new.cost < point.cost else point
             return _solution(problem, point, step, Status.CONVERGED)
         moved = yield from _line_search(point, delta, slope)
         if moved is None:
+            whole = False
             if keep:
                 keep = False
                 continue
@@ -164,8 +171,8 @@ def descent(
                 return _solution(problem, point, step, Status.STALLED)
             mu = max(FIRST_DAMPING, 10 * MORE_DAMPING * mu)
             continue
-        point, length = moved
-        whole = mu == 0 and solved and length == 1.0
+        point, length, whole = moved
+        whole = whole and mu == 0 and solved
         keep = whole and predicted <= KEEP_H * point.cost and not (keep and predicted > SLOW * last)
         last = predicted
         if length < SHORT_STEP:
@@ -193,8 +200,8 @@ def _ends(problem: Problem) -> tuple[Array, Array, Array]:
 
 def _line_search(
     point: Point, delta: Array, slope: float
-) -> Generator[Trial, Point, tuple[Point, float] | None]:
-    """The point a fraction of `delta` away that lowers E, and the fraction, or None.
+) -> Generator[Trial, Point, tuple[Point, float, bool] | None]:
+    """The point a fraction of `delta` away that lowers E, the fraction that did, and whether all was gone; or None.
 
     `slope` is -dE/dlength at 0. Lengths follow the parabola through E(0), E'(0), E(length), kept within 0.15 to 0.7
     of the last.
@@ -209,8 +216,8 @@ def _line_search(
                 # Residuals too large for Gauss-Newton: whole steps would zig-zag across the valley for ever
                 other = yield Trial(point, delta, _parabola(E, slope, new.cost, length))
                 if other.cost < new.cost:
-                    return other, length
-            return new, length
+                    return other, length, False
+            return new, length, length == 1.0
         seen = new.cost < np.inf
         length = _parabola(E, slope, new.cost, length) if seen else 0.15 * length
     return None
@@ -254,14 +261,12 @@ def solve(
 
 
 def _answer(problem: Problem, request: Request) -> Any:
-    match request:
-        case Trial(point, delta, length):
-            S, step = len(point.alpha), length * delta
-            return evaluate(problem, moved_view(point.view, step[S:]), point.alpha + step[:S])
-        case Linearised((alpha, view, seen, e, _)):
-            return normal_equations(problem, alpha, view, seen, e)
-        case Gradient((alpha, view, seen, e, _)):
-            return gradient(problem, alpha, view, seen, e)
+    if isinstance(request, Trial):
+        point, delta, length = request
+        S, step = len(point.alpha), length * delta
+        return evaluate(problem, moved_view(point.view, step[S:]), point.alpha + step[:S])
+    work = gradient if isinstance(request, Gradient) else normal_equations
+    return work(problem, *request.point[:4])
 
 
 def evaluate(problem: Problem, view: View, alpha: Array) -> Point:
