@@ -1,4 +1,4 @@
-"""The array types of every signature, and the two ways an array crosses a border.
+"""The array types of every signature, and the ways arrays and numbers cross a border.
 
 S modes, L landmarks, N vertices, B control vertices, F faces: the same letters everywhere.
 """
@@ -6,6 +6,7 @@ S modes, L landmarks, N vertices, B control vertices, F faces: the same letters 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from numbers import Integral, Real
 from typing import TypeVar
 
 import numpy as np
@@ -28,9 +29,16 @@ def checked(
 ) -> Array:
     """`value` as float64 of `shape` (None: any length); ValueError names the argument and what came."""
     try:
-        array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{name}: expected numbers, found {value!r:.60}") from error
+        if isinstance(value, np.ma.MaskedArray):  # what is masked is missing, not what lies below
+            value = np.ma.filled(value.astype(np.float64), np.nan)
+        array = np.asarray(value)
+        if (
+            array.dtype.kind not in "biufO"
+        ):  # text and complex numbers would be converted in silence
+            raise ValueError(f"of type {array.dtype}")
+        array = array.astype(np.float64, copy=False)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ValueError(f"{name}: expected numbers, found {shown(value)}") from error
     fits = array.ndim == len(shape) and all(
         want is None or want == have for want, have in zip(shape, array.shape, strict=False)
     )
@@ -41,3 +49,35 @@ def checked(
     if not finite.all():
         raise ValueError(f"{name}: every value must be finite{' or NaN (missing)' if nan else ''}")
     return array
+
+
+def number(name: str, value: object) -> float:
+    """`value` as a float, NaN and infinity included; ValueError for what is no real number (text, bool, None)."""
+    value = _scalar(value)
+    if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
+        raise ValueError(f"{name}: {shown(value)} is not a number")
+    try:
+        return float(value)
+    except OverflowError as error:  # a whole number beyond every float
+        raise ValueError(f"{name}: {shown(value)} is too large") from error
+
+
+def whole(name: str, value: object) -> int:
+    """`value` as an int; ValueError for what is no whole number (text, bool, None, 70.0)."""
+    value = _scalar(value)
+    if isinstance(value, bool | np.bool_) or not isinstance(value, Integral):
+        raise ValueError(f"{name}: {shown(value)} is not a whole number")
+    return int(value)
+
+
+def shown(value: object) -> str:
+    """`value` in at most 60 characters of one line, for an error message."""
+    try:
+        text = " ".join(repr(value).split())
+    except ValueError:  # Python refuses to write more than 4300 digits
+        return "a number of that many digits"
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _scalar(value: object) -> object:
+    return value.item() if isinstance(value, np.ndarray) and value.ndim == 0 else value

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.special import gammaln
 
-from .arrays import Array, read_only
+from .arrays import Array, read_only, shown, whole
 from .camera import jacobian
 from .fitting import Fit, landmark_rows
 from .model import FaceModel
@@ -40,6 +40,8 @@ class FlexibilityModes:
 
         Empty, (0, 0), where the fitted face itself is beyond the limit.
         """
+        if not 0 <= whole("mode", mode) < len(self.directions):
+            raise ValueError(f"mode: {shown(mode)} is not within 0 to {len(self.directions) - 1}")
         f, alpha = self.directions[mode], self.fit.alpha
         a, b, c = f @ f, alpha @ f, alpha @ alpha - plausible_limit(len(alpha)) ** 2
         if c > 0:
@@ -60,9 +62,18 @@ def flexibility_modes(model: FaceModel, fit: Fit, count: int = 3) -> Flexibility
     The surface is the model's evaluation region, the one d_S is measured on. The sign makes the part that moves most
     along z move forward.
     """
+    if not isinstance(model, FaceModel):
+        raise ValueError(f"model: {shown(model)} is not a FaceModel; load one with load_model")
+    if not isinstance(fit, Fit):
+        raise ValueError(f"fit: {shown(fit)} is not a Fit")
     S = len(fit.alpha)
-    if not 1 <= count <= S:
-        raise ValueError(f"count: {count} is not within 1 to {S}")
+    if model.n_vertices != fit.model.n_vertices or model.n_modes < S:
+        raise ValueError(
+            f"model: {model.n_vertices} vertices, {model.n_modes} modes; "
+            f"the fit is of one with {fit.model.n_vertices} and {fit.model.n_modes}"
+        )
+    if not 1 <= whole("count", count) <= S:
+        raise ValueError(f"count: {shown(count)} is not within 1 to {S}")
     visible = fit.observation.visible
     vertices = fit.observation.vertices(model)[visible]
     mean, _, modes = landmark_rows(model, tuple(vertices.tolist()), model.n_modes)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .arrays import Array, IntArray, checked, read_only
+from .arrays import Array, IntArray, checked, number, read_only, shown, whole
 from .camera import Camera, depths, project
 from .model import FaceModel, Scheme, Subject
 from .rotation import rotation_from_angles
@@ -17,10 +17,16 @@ MIN_POINTS = (
 FLATTEST = (
     1e-3  # smallest ratio of the two singular values of the points before they count as one line
 )
+LARGEST_PX = 1e9  # pixels from 0: far beyond every picture, and squares of it are still exact sums
+SMALLEST_PX = (
+    1e-6  # pixels from end to end of the points: coordinates in units of a picture are far above
+)
+HEAVIEST = 1e9  # ratio of the largest weight to 1 and of 1 to the smallest
 DISTANCES = (
     0.2,
     5.0,
 )  # metres, of the camera that took the photograph; nearer, the nose leaves the lens's view
+LARGEST_EYES_PX = 1e6
 EYES_PX = (
     100.0  # synthetic photographs: frontal distance of the eye centres in a picture of 500 x 500
 )
@@ -38,9 +44,13 @@ class Observation:
 
     def __post_init__(self) -> None:
         points = checked("points", self.points, (None, 2), nan=True)
+        _within("points", points)
         object.__setattr__(self, "points", read_only(points))
         if not isinstance(self.scheme, str):
-            numbers = np.asarray(self.scheme)
+            try:
+                numbers = np.asarray(self.scheme)
+            except ValueError:  # lists of unequal length
+                numbers = np.empty(0)
             if numbers.dtype.kind not in "iu" or numbers.shape != (len(points),):
                 raise ValueError(f"scheme: expected a name or {len(points)} vertex numbers")
             object.__setattr__(self, "scheme", read_only(numbers.astype(np.intp)))
@@ -48,19 +58,45 @@ class Observation:
             weights = checked("weights", self.weights, (len(points),))
             if (weights < 0).any():
                 raise ValueError(f"weights: {weights.min():g} is negative")
+            used = weights[weights > 0]
+            if len(used) and not 1 / HEAVIEST <= used.min() <= used.max() <= HEAVIEST:
+                raise ValueError(
+                    f"weights: {used.min():g} to {used.max():g} is not within "
+                    f"{1 / HEAVIEST:g} to {HEAVIEST:g} (or 0)"
+                )
             object.__setattr__(self, "weights", read_only(weights))
-        if self.image_size is not None and checked("image_size", self.image_size, (2,)).min() < 1:
-            raise ValueError(f"image_size: {self.image_size} is not a width and a height in pixels")
+        if self.image_size is not None:
+            size = checked("image_size", self.image_size, (2,))
+            if size.min() < 1:
+                raise ValueError(
+                    f"image_size: {shown(self.image_size)} is not a width and a height in pixels"
+                )
+            _within("image_size", size)
         if self.principal_point is not None:
-            checked("principal_point", self.principal_point, (2,))
+            _within("principal_point", checked("principal_point", self.principal_point, (2,)))
         self._refuse_unusable()
 
     def _refuse_unusable(self) -> None:
         visible = self.points[self.visible]
         if len(visible) < MIN_POINTS:
+            given = int(np.isfinite(self.points.sum(axis=1)).sum())
+            if given >= MIN_POINTS:
+                raise ValueError(
+                    f"weights: only {len(visible)} of {given} visible points weigh more than 0; "
+                    f"{MIN_POINTS} are needed"
+                )
             raise ValueError(
                 f"points: {len(visible)} visible; {MIN_POINTS} are needed, 12 are better"
             )
+        places = len(np.unique(visible, axis=0))
+        if places < MIN_POINTS:
+            raise ValueError(
+                f"points: {len(visible)} visible, but at only {places} different places; "
+                f"{MIN_POINTS} are needed"
+            )
+        length = float(np.ptp(visible, axis=0).max())
+        if length < SMALLEST_PX:
+            raise ValueError(f"points: they lie within {length:g} pixels; give them in pixels")
         spread = np.linalg.svd(visible - visible.mean(0), compute_uv=False)
         if spread[1] <= FLATTEST * spread[0]:
             raise ValueError(
@@ -98,12 +134,19 @@ class Observation:
                     f"points: {len(self.points)} for scheme {scheme.name!r}, which has {len(scheme)}"
                 )
             return scheme.vertices
-        for number in (self.scheme.min(), self.scheme.max()):
-            if not 0 <= number < model.n_vertices:
+        for vertex in (self.scheme.min(), self.scheme.max()):
+            if not 0 <= vertex < model.n_vertices:
                 raise ValueError(
-                    f"scheme: vertex {number} is not within 0 to {model.n_vertices - 1}"
+                    f"scheme: vertex {vertex} is not within 0 to {model.n_vertices - 1}"
                 )
         return self.scheme
+
+
+def _within(name: str, pixels: Array) -> None:
+    """ValueError for pixels beyond every picture: their squares would overflow."""
+    largest = float(np.nanmax(np.abs(pixels), initial=0.0))
+    if largest > LARGEST_PX:
+        raise ValueError(f"{name}: {largest:g} is not within {LARGEST_PX:g} pixels")
 
 
 def eye_distance(points: Array, scheme: Scheme) -> float:
@@ -127,12 +170,22 @@ def portrait_camera(
     The zoom is the one that makes the eye centres of the *frontal* face `eyes_px` apart, so a portrait from far away is
     the same size as one from near, and turning the head does not zoom. distance None is a far-away camera.
     """
+    if not isinstance(face, Subject):
+        raise ValueError(f"face: {shown(face)} is not a Subject; take one with model.subject(1)")
+    if not isinstance(scheme, str):
+        raise ValueError(f"scheme: {shown(scheme)} is not the name of a landmark scheme")
+    distance = None if distance is None else number("distance", distance)
     if distance is not None and not DISTANCES[0] <= distance <= DISTANCES[1]:
         raise ValueError(
             f"distance: {distance:g} m is not within {DISTANCES[0]:g} to {DISTANCES[1]:g}"
         )
-    if not 1 <= eyes_px < np.inf:
-        raise ValueError(f"eyes_px: {eyes_px:g} is not a distance of at least 1 pixel")
+    eyes_px = number("eyes_px", eyes_px)
+    if not 1 <= eyes_px <= LARGEST_EYES_PX:
+        raise ValueError(f"eyes_px: {eyes_px:g} is not within 1 to {LARGEST_EYES_PX:g} pixels")
+    for name, value in (("yaw_deg", yaw_deg), ("pitch_deg", pitch_deg), ("roll_deg", roll_deg)):
+        degrees = number(name, value)
+        if not abs(degrees) <= 360:  # False for NaN too
+            raise ValueError(f"{name}: {degrees:g} is not within -360 to 360 degrees")
     kappa = 0.0 if distance is None else 1.0 / distance
     points = face.vertices[face.model.scheme(scheme).vertices]
     frontal = Camera(rotation_from_angles(0, 0, 0), np.zeros(2), 1.0, kappa)
@@ -166,8 +219,13 @@ def observe(
     seed: of the noise.
     eyes_px: pixels between the eye centres of the frontal face.
     """
+    eyes_px = number("eyes_px", eyes_px)
+    noise_percent = number("noise_percent", noise_percent)
     if not 0 <= noise_percent <= 20:
         raise ValueError(f"noise_percent: {noise_percent:g} is not within 0 to 20")
+    seed = whole("seed", seed)
+    if seed < 0:
+        raise ValueError(f"seed: {shown(seed)} is negative")
     camera = portrait_camera(
         face,
         distance=distance,

@@ -1,38 +1,54 @@
 """Fits along the camera distance: how d_L hardly changes while the face does (paper, section 6.1).
 
-The grid is uniform in log t_z and ends in the orthographic camera, kappa = 0. Each fit starts from its neighbour's with
-only kappa changed: in the unified camera nothing else needs rescaling (MATH.md 6).
+The grid is uniform in log t_z and ends in the orthographic camera, kappa = 0. The path is followed from there to the
+nearest distance. Each fit starts from its neighbours: only kappa changes, in the unified camera nothing else needs
+rescaling (MATH.md 6), and the way of the last three fits is carried on, which saves a third of the steps.
+
+Both ends are checked by fits that know nothing of the path: it begins at one, and where it arrives another is made
+from the closed-form pose. If their costs agree the path is taken for the only one; if not, it is followed back from
+there as well, the lower of each two fits is kept, and the sweep says where they differed.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import Array, checked, read_only
-from .camera import depths
-from .fitting import FARTHEST, NEAREST, Fit, FitOptions, prepare, solve_from, start_pose
+from .arrays import Array, checked, number, read_only
+from .camera import Camera, depths
+from .fitting import FARTHEST, NEAREST, Fit, FitOptions, Task, prepare, solve_from, start_pose
 from .fitting.result import Jacobian, Method, Weighting
+from .fitting.tangent import tangent
 from .metrics import HUMAN_TOLERANCE_PERCENT
 from .model import FaceModel
 from .observation import Observation
+from .rotation import rotation_matrix
 
 GRID = (0.2, 3.0, 49)  # metres from, to, steps: the range of the page's slider
 END_TOLERANCE = 0.01  # relative, how exactly the ends of an interval are found
+STRAIGHT = 20.0  # metres; farther, d_L goes to its limit like 1 / t_z and does not turn (MATH.md 6)
+WIDEST = 1.5  # of the last step: a next one wider than that is not extrapolated to
+SPEEDS_AT_ONCE = 32  # fits whose surfaces are in memory together
+GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
+# Two fits at one distance differ if their costs do, relatively by more than the solver's leftover, and by more than
+# points a millionth of a pixel off would cause: of a cost of rounding alone no digit agrees
+SAME_COST, SAME_PX = 1e-6, 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """All distances with d_L below a tolerance, metres."""
+    """The distances with d_L below a tolerance, in one piece around the best, metres."""
 
     low: float | None  # None: open, the nearest distance of the sweep is inside
     high: float | None  # None: open at infinity
     empty: bool  # no distance reaches the tolerance
-    best_d_l_percent: float
+    best_d_l_percent: float  # least d_L found; if empty the least there is
     tolerance_percent: float
+    pieces: int = 1  # of all such distances; only the one that holds the best is told
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,9 +58,13 @@ class Sweep:
     distances: Array  # (D,) metres, ascending
     fits: tuple[Fit, ...]  # D, perspective
     orthographic: Fit
+    # (K,) metres, inf for the orthographic camera: where the two directions ended at different costs, usually nowhere.
+    # The lower is kept
+    disagreed: Array = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "distances", read_only(self.distances))
+        for name in ("distances", "disagreed"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
     def d_l_percent(self) -> Array:
@@ -52,34 +72,50 @@ class Sweep:
         return np.array([fit.d_l_percent for fit in self.fits])
 
     def nearest(self, distance: float) -> Fit:
-        """The fit whose distance is nearest in ratio: a start for a fit at `distance`."""
+        """The fit whose distance is nearest in ratio: a start for a fit at `distance`, metres."""
+        distance = number("distance", distance)
+        if not 0 < distance < np.inf:
+            raise ValueError(f"distance: {distance:g} m is not above 0 and finite")
         return self.fits[int(np.argmin(np.abs(np.log(self.distances / distance))))]
 
-    def interval(self, tolerance_percent: float = HUMAN_TOLERANCE_PERCENT) -> Interval:
-        """The distances around the best one that the tolerance cannot tell apart, each end to 1 %."""
-        d_l = self.d_l_percent
-        best = int(np.argmin(d_l))
-        least = min(float(d_l[best]), self.orthographic.d_l_percent)
-        if least > tolerance_percent:
-            return Interval(None, None, True, least, tolerance_percent)
-        if d_l[best] > tolerance_percent:  # only farther cameras than the sweep's reach it
-            low = _end_beyond(self.fits[-1], tolerance_percent) or FARTHEST
-            return Interval(low, None, False, least, tolerance_percent)
-        low = self._end(range(best, -1, -1), tolerance_percent)
-        high = self._end(range(best, len(self.fits)), tolerance_percent)
-        if high is None and self.orthographic.d_l_percent > tolerance_percent:
-            high = _end_beyond(self.fits[-1], tolerance_percent)
-        return Interval(low, high, False, least, tolerance_percent)
+    def speed_mm_per_octave(self) -> Array:
+        """(D,) how fast the face changes at each distance: mm of mean surface movement per doubling of the distance.
 
-    def _end(self, order: range, tolerance_percent: float) -> float | None:
-        """Where d_L crosses the tolerance going outward in `order`; None if it does not."""
-        inside = self.fits[order[0]]
-        for index in order:
-            fit = self.fits[index]
-            if fit.d_l_percent > tolerance_percent:
-                return _crossing(inside, fit, tolerance_percent)
-            inside = fit
-        return None
+        The derivative of d_S: mean over the model's evaluation region of the vertices' velocity along the path, its
+        rigid motion taken out, times log 2. From the tangent of each fit, not from differences of the grid: it does
+        not depend on the grid. Computed when asked for, 1 to 2 ms a distance.
+        """
+        chunks = range(0, len(self.fits), SPEEDS_AT_ONCE)
+        return np.concatenate([path_speeds(self.fits[k : k + SPEEDS_AT_ONCE]) for k in chunks])
+
+    def interval(self, tolerance_percent: float = HUMAN_TOLERANCE_PERCENT) -> Interval:
+        """The distances around the best one that the tolerance cannot tell apart, each end to 1 %.
+
+        All distances from the sweep's nearest to infinity count, those beyond its farthest and between its own too:
+        a turn of d_L between two distances is looked for where it decides. Ends lie on the inner side. d_L is taken to
+        turn once at most between neighbours of the sweep; pieces narrower than 1 % may be missed.
+        """
+        tolerance = number("tolerance_percent", tolerance_percent)
+        if not 0 < tolerance < np.inf:
+            raise ValueError(f"tolerance_percent: {tolerance:g} is not above 0 and finite")
+        nodes = _with_turns(_to_infinity(self), tolerance)
+        d_l = np.array([fit.d_l_percent for fit in nodes])
+        inside, best = d_l <= tolerance, int(np.argmin(d_l))
+        if not inside[best]:
+            return Interval(None, None, True, float(d_l[best]), tolerance, 0)
+        first = best
+        while first > 0 and inside[first - 1]:
+            first -= 1
+        last = best
+        while last < len(nodes) - 1 and inside[last + 1]:
+            last += 1
+        low = high = None
+        if first > 0:
+            low = _crossing(nodes[first], nodes[first - 1], tolerance) or FARTHEST
+        if last < len(nodes) - 1:
+            high = _crossing(nodes[last], nodes[last + 1], tolerance)
+        pieces = int(inside[0]) + int(np.count_nonzero(~inside[:-1] & inside[1:]))
+        return Interval(low, high, False, float(d_l[best]), tolerance, pieces)
 
 
 def sweep_distance(
@@ -87,7 +123,7 @@ def sweep_distance(
     observation: Observation,
     distances: ArrayLike | None = None,
     *,
-    modes: int = 70,
+    modes: int | None = None,
     box: float | None = 2.0,
     noise_percent: float = 1.0,
     prior_weight: float | None = None,
@@ -98,7 +134,18 @@ def sweep_distance(
     jacobian: Jacobian = "kaufman",
     als_rounds: int | None = 10,
 ) -> Sweep:
-    """Fits at every distance (D,), metres (default: 49 from 0.2 to 3 m), and orthographic; options as `fit`."""
+    """Fits at every distance, and orthographic.
+
+    Parameters
+    ----------
+    distances: (n,) metres in any order, each kept once; None: 49 from 0.2 to 3 m, evenly in ratio. Two neighbours
+        may be far apart: the path between them need not be followed closely, only less steps are saved.
+    modes, box, ...: as `fit`.
+
+    Raises
+    ------
+    ValueError: an argument out of range, or points that do not belong to the model.
+    """
     options = FitOptions(
         modes, box, noise_percent, prior_weight, tolerance, max_steps,
         weighting, method, jacobian, als_rounds,
@@ -115,47 +162,170 @@ def sweep_distance(
             f"distances: {grid[0]:g} to {grid[-1]:g} m is not within {NEAREST:g} to {FARTHEST:g}"
         )
     task = prepare(model, observation, options)
-    camera = start_pose(task.problem, 0.0)
-    orthographic = solve_from(task, camera, np.zeros(task.problem.modes.shape[2]))
-    fits: list[Fit] = []
-    last = orthographic
-    for t_z in grid[::-1]:  # from far to near: the orthographic fit is the farthest neighbour
-        camera = replace(last.camera, kappa=1.0 / float(t_z))
-        v = task.problem.mean + task.problem.modes @ last.alpha
-        if (depths(camera, v) <= 0).any():  # a wide gap in the grid: start afresh
-            camera = start_pose(task.problem, 1.0 / float(t_z))
-            last = replace(last, alpha=np.zeros_like(last.alpha))
-        last = solve_from(task, camera, last.alpha)
-        fits.append(last)
-    return Sweep(grid, tuple(fits[::-1]), orthographic)
+    kappas = [0.0, *(1.0 / grid[::-1]).tolist()]
+    path = follow(task, kappas, _cold(task, 0.0))
+    arrival = _cold(task, kappas[-1])
+    disagreed: list[float] = []
+    if _differ(task, path[-1], arrival):
+        back = follow(task, kappas[::-1], arrival)[::-1]
+        pairs = list(zip(path, back, strict=True))
+        disagreed = [a.distance or np.inf for a, b in pairs if _differ(task, a, b)]
+        path = [b if b.cost < a.cost and _differ(task, a, b) else a for a, b in pairs]
+    return Sweep(grid, tuple(path[:0:-1]), path[0], np.array(disagreed[::-1]))
 
 
-def _crossing(inside: Fit, outside: Fit, tolerance_percent: float) -> float:
-    """Distance between two fits where d_L reaches the tolerance, by bisection in log t_z."""
-    task = prepare(inside.model, inside.observation, inside.options)
-    near, far = inside, outside
-    a, b = (1.0 / fit.camera.kappa for fit in (near, far))
-    while abs(np.log(a / b)) > END_TOLERANCE:
-        middle = float(np.sqrt(a * b))
-        fit = solve_from(task, replace(near.camera, kappa=1.0 / middle), near.alpha)
-        if fit.d_l_percent > tolerance_percent:
-            b = middle
-        else:
-            a, near = middle, fit
-    return a
+def follow(task: Task, kappas: Sequence[float], first: Fit) -> list[Fit]:
+    """Fits at `kappas`, per metre, each from those before it; `first` is the one at kappas[0]."""
+    path = [first]
+    for kappa in kappas[1:]:
+        path.append(solve_from(task, *_start(task, path[-3:], kappa)))
+    return path
 
 
-def _end_beyond(fit: Fit, tolerance_percent: float) -> float | None:
-    """Where d_L crosses the tolerance farther away than `fit`, by doubling the distance; None: nowhere."""
+def path_speeds(fits: Sequence[Fit]) -> Array:
+    """Speed (D,) of the face along the path through each of `fits`, of one task: `Sweep.speed_mm_per_octave`."""
+    task, model = prepare(fits[0].model, fits[0].observation, fits[0].options), fits[0].model
+    # (S, D, 2) shape and velocity of all at once: the modes are read from memory once, not once a fit
+    changes = np.zeros((model.n_modes, len(fits), 2))
+    for k, fit in enumerate(fits):
+        S = len(fit.alpha)
+        changes[:S, k, 0] = fit.alpha
+        changes[:S, k, 1] = tangent(task.problem, fit.camera, fit.alpha)[:S]
+    flat = model.control_modes.reshape(-1, model.n_modes) @ changes.reshape(model.n_modes, -1)
+    surface = model.refine(flat.reshape(len(model.control_mean), -1)).reshape(-1, 3, len(fits), 2)
+    mean = model.mean
+    if model.evaluation is not None:
+        surface, mean = surface[model.evaluation], mean[model.evaluation]
+    unrigid = [_unrigid(mean + surface[:, :, k, 0], surface[:, :, k, 1]) for k in range(len(fits))]
+    return 1e3 * np.log(2.0) * np.array([np.linalg.norm(gap, axis=1).mean() for gap in unrigid])
+
+
+def _unrigid(shape: Array, velocity: Array) -> Array:
+    """`velocity` (E, 3) of the points `shape` (E, 3) without the rigid one a + w x shape nearest to it.
+
+    Procrustes to first order.
+    """
+    centred, velocity = shape - shape.mean(axis=0), velocity - velocity.mean(axis=0)
+    spread = centred.T @ centred
+    inertia = np.trace(spread) * np.eye(3) - spread
+    twist = centred.T @ velocity
+    x, y, z = np.linalg.solve(
+        inertia, [twist[1, 2] - twist[2, 1], twist[2, 0] - twist[0, 2], twist[0, 1] - twist[1, 0]]
+    )
+    return velocity - centred @ np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
+
+
+def _cold(task: Task, kappa: float) -> Fit:
+    """The fit from the closed-form pose, which knows no other."""
+    return solve_from(task, start_pose(task.problem, kappa), np.zeros(task.problem.modes.shape[2]))
+
+
+def _differ(task: Task, a: Fit, b: Fit) -> bool:
+    slack = SAME_COST * min(a.cost, b.cost) + float(task.problem.weights.sum()) * SAME_PX**2
+    return abs(a.cost - b.cost) > max(1.0, task.options.tolerance / 1e-8) * slack
+
+
+def _start(task: Task, last: Sequence[Fit], kappa: float) -> tuple[Camera, Array]:
+    """Where a fit at kappa starts: the polynomial through the last fits, one to three, or the last one, or afresh.
+
+    A polynomial carried far beyond its points ends anywhere: a step much wider than the last starts from its neighbour.
+    The tangent of the path would save no more steps, and costs two.
+    """
+    still = last[-1]
+    step, gap = kappa - still.camera.kappa, still.camera.kappa - last[-2:][0].camera.kappa
+    carried = 0 < step / gap <= WIDEST if gap else False
+    camera, alpha = (
+        _carried_on(last, kappa) if carried else (replace(still.camera, kappa=kappa), still.alpha)
+    )
+    if (depths(camera, task.problem.mean + task.problem.modes @ alpha) <= 0).any():
+        return start_pose(task.problem, kappa), np.zeros_like(alpha)
+    return camera, alpha
+
+
+def _carried_on(last: Sequence[Fit], kappa: float) -> tuple[Camera, Array]:
+    """Camera and shape at kappa of the polynomial in kappa through the last fits, two or three, oldest first."""
+    *before, still = last
+    camera, at = still.camera, [fit.camera.kappa for fit in last]
+    # Added to the last fit: what does not change between fits, coefficients on the box, stays to the last digit
+    alpha, t, log_s, turn = still.alpha.copy(), camera.t.copy(), 0.0, np.zeros((3, 3))
+    for a, fit in zip(at, before, strict=False):
+        weight = math.prod((kappa - b) / (a - b) for b in at if b != a)  # Lagrange's
+        alpha += weight * (fit.alpha - still.alpha)
+        t += weight * (fit.camera.t - camera.t)
+        log_s += weight * math.log(fit.camera.s / camera.s)
+        turn += weight * fit.camera.R
+    turn = turn @ camera.R.T  # of small angles: its antisymmetric part is the rotation
+    d = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+    box = still.options.box
+    if box is not None:
+        alpha = alpha.clip(-box, box)
+    return Camera(rotation_matrix(d) @ camera.R, t, camera.s * math.exp(log_s), kappa), alpha
+
+
+def _at(fit: Fit, kappa: float) -> Fit:
+    """The fit at kappa on the path through `fit`."""
     task = prepare(fit.model, fit.observation, fit.options)
-    within = fit.d_l_percent <= tolerance_percent
-    while FARTHEST * fit.camera.kappa >= 2.0:
-        farther = solve_from(task, replace(fit.camera, kappa=0.5 * fit.camera.kappa), fit.alpha)
-        if (farther.d_l_percent <= tolerance_percent) != within:
-            inside, outside = (fit, farther) if within else (farther, fit)
-            return _crossing(inside, outside, tolerance_percent)
-        fit = farther
-    return None
+    return solve_from(task, *_start(task, [fit], kappa))
+
+
+def _to_infinity(sweep: Sweep) -> list[Fit]:
+    """The fits from the nearest to the orthographic one; beyond the sweep's farthest, one each doubling."""
+    nodes = list(sweep.fits)
+    while STRAIGHT * nodes[-1].camera.kappa > 1.0:
+        nodes.append(_at(nodes[-1], 0.5 * nodes[-1].camera.kappa))
+    return [*nodes, sweep.orthographic]
+
+
+def _with_turns(nodes: list[Fit], tolerance: float) -> list[Fit]:
+    """`nodes` and, between them, the turns of d_L that may cross the tolerance where no node does.
+
+    A node on the wrong side of the tolerance that is nearest to it of its neighbours: the turn is beside it.
+    """
+    d_l = [fit.d_l_percent for fit in nodes]
+    found = list(nodes)
+    for i in range(len(nodes) - 1):  # the last is infinity, where nothing turns
+        beside = [d_l[j] for j in (i - 1, i + 1) if j >= 0]
+        dips = d_l[i] > tolerance and d_l[i] <= min(beside)
+        rises = i > 0 and d_l[i] <= tolerance and d_l[i] >= max(beside)
+        if dips or rises:
+            found.append(_turn(nodes[max(i - 1, 0)], nodes[i + 1], 1.0 if dips else -1.0))
+    return sorted(found, key=lambda fit: -fit.camera.kappa)
+
+
+def _turn(near: Fit, far: Fit, sign: float) -> Fit:
+    """The fit between two where sign * d_L is least, by golden section in kappa to 1 %."""
+    a, b = far.camera.kappa, near.camera.kappa
+    x, y = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
+    at_x, at_y = _at(near, x), _at(near, y)
+    while b - a > END_TOLERANCE * b:
+        if sign * at_x.d_l_percent < sign * at_y.d_l_percent:
+            b, y, at_y = y, x, at_x
+            x = b - GOLDEN * (b - a)
+            at_x = _at(at_y, x)
+        else:
+            a, x, at_x = x, y, at_y
+            y = a + GOLDEN * (b - a)
+            at_y = _at(at_x, y)
+    return min(at_x, at_y, key=lambda fit: sign * fit.d_l_percent)
+
+
+def _crossing(inside: Fit, outside: Fit, tolerance: float) -> float | None:
+    """Distance where d_L reaches the tolerance between a fit inside and one outside it; None: beyond FARTHEST.
+
+    By bisection in log t_z; before, if one of the two is orthographic, by doubling the other's distance.
+    """
+    while True:
+        a, b = inside.camera.kappa, outside.camera.kappa
+        if min(a, b) > 0 and abs(np.log(a / b)) <= END_TOLERANCE:
+            return 1.0 / a
+        kappa = float(np.sqrt(a * b)) if min(a, b) > 0 else 0.5 * max(a, b)
+        if kappa * FARTHEST < 1.0:
+            return None
+        fit = _at(outside if a == 0 else inside, kappa)
+        if fit.d_l_percent <= tolerance:
+            inside = fit
+        else:
+            outside = fit
 
 
 __all__: Sequence[str] = ["Interval", "Sweep", "sweep_distance"]

@@ -25,11 +25,13 @@ MEMBERS = {
         "translation", "vertices",
     },
     fa.FlexibilityModes: {"directions", "landmark_percent", "reach", "words"},
-    fa.Interval: {"best_d_l_percent", "empty", "high", "low", "tolerance_percent"},
+    fa.Interval: {"best_d_l_percent", "empty", "high", "low", "pieces", "tolerance_percent"},
     fa.Scheme: {"eyes_meaning", "name", "points", "vertices"},
-    fa.Sweep: {"d_l_percent", "distances", "fits", "interval", "orthographic"},
+    fa.Sweep: {
+        "d_l_percent", "disagreed", "distances", "fits", "interval", "nearest", "orthographic", "speed_mm_per_octave",
+    },
 }  # fmt: skip
-OPTIONS = {"modes": 70, "box": 2.0, "noise_percent": 1.0, "prior_weight": None}
+OPTIONS = {"modes": None, "box": 2.0, "noise_percent": 1.0, "prior_weight": None}
 SIGNATURES = {
     fa.load_model: (["path"], {"part": "face", "origin": "eyes"}),
     fa.observe: (["face"], {"yaw_deg": 0.0, "noise_percent": 0.0, "seed": 0, "scheme": "ibug68"}),

@@ -46,7 +46,10 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """One line on stderr, exit status 2."""
-        self.exit(BAD_INPUT, f"{self.prog}: {message}\n")
+        short = (
+            message if len(message) <= 300 else f"{message[:297]}..."
+        )  # argparse repeats all of a value
+        self.exit(BAD_INPUT, f"{self.prog}: {short}\n")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -136,7 +139,11 @@ def _points(command: argparse.ArgumentParser) -> None:
         metavar="WxH",
         help="size of the picture in pixels, if it does not lie beside the points",
     )
-    command.add_argument("--modes", type=int, default=70, help="shape modes used (default 70)")
+    command.add_argument(
+        "--modes",
+        type=int,
+        help="shape modes used (default: the strongest 70, or all of a model with fewer)",
+    )
     command.add_argument(
         "--box", type=float, default=2.0, help="largest shape coefficient, sd (default 2)"
     )
@@ -262,19 +269,36 @@ def run_sweep(options: argparse.Namespace) -> int:
     )  # fmt: skip
     interval = sweep.interval()
     fits = (*sweep.fits, sweep.orthographic)
+    speeds = [*sweep.speed_mm_per_octave().tolist(), 0.0]  # at infinity no doubling changes a thing
     if options.json:
         span = {
             "low_m": interval.low,
             "high_m": interval.high,
             "empty": interval.empty,
+            "pieces": interval.pieces,
+            "best_d_l_percent": interval.best_d_l_percent,
             "tolerance_percent": interval.tolerance_percent,
         }
-        print(json.dumps({"fits": [fit_record(fit) for fit in fits], "interval": span} | notes))
+        records = [
+            fit_record(fit) | {"speed_mm_per_octave": speed}
+            for fit, speed in zip(fits, speeds, strict=True)
+        ]
+        # JSON knows no infinity: null is the orthographic camera, as in distance_m
+        disagreed = [None if np.isinf(d) else d for d in sweep.disagreed.tolist()]
+        print(
+            json.dumps(
+                {"fits": records, "interval": span, "disagreed_distances_m": disagreed} | notes
+            )
+        )
     else:
-        print("distance cm   d_L %   status")
-        for fit in fits:
+        print("distance cm   d_L %   face changes mm per doubling   status")
+        for fit, speed in zip(fits, speeds, strict=True):
             name = "orthographic" if fit.distance is None else f"{100 * fit.distance:.4g}"
-            print(f"{name:>12} {fit.d_l_percent:7.3f}   {fit.status}")
+            print(f"{name:>12} {fit.d_l_percent:7.3f} {speed:30.2f}   {fit.status}")
+        if len(sweep.disagreed):
+            print(
+                f"at {len(sweep.disagreed)} distances another fit came from the other side; the lower cost is kept"
+            )
         print(interval_words(interval))
         print(
             f"interocular distance: {fits[0].interocular_px:.1f} px, {fits[0].interocular_meaning}"
@@ -292,7 +316,13 @@ def interval_words(interval: fa.Interval) -> str:
         return f"no distance brings d_L under {tolerance}: the best is {interval.best_d_l_percent:.2f} %"
     low = "the nearest tried" if interval.low is None else f"{100 * interval.low:.3g} cm"
     high = "infinity" if interval.high is None else f"{100 * interval.high:.3g} cm"
-    return f"d_L stays under {tolerance} from {low} to {high}: within it the points do not tell the distance"
+    others = (
+        "" if interval.pieces == 1 else f" ({interval.pieces} such ranges; this one holds the best)"
+    )
+    return (
+        f"d_L stays under {tolerance} from {low} to {high}{others}: "
+        "within it the points do not tell the distance"
+    )
 
 
 def observation_of(options: argparse.Namespace) -> tuple[fa.Observation, dict[str, Any]]:

@@ -80,10 +80,15 @@ def fitted(target: Target, fitting: Fitting) -> fa.Fit:
         taken.observation,
         camera="perspective" if fitting.distance is not None else "orthographic",
         distance=fitting.distance,
-        modes=fitting.modes,
+        modes=_modes(fitting),
         box=fitting.box,
         noise_percent=fitting.prior,
     )
+
+
+def _modes(fitting: Fitting) -> int | None:
+    """The modes a fit is asked for: a setting left alone is the library's default, which suits smaller models too."""
+    return None if fitting.modes == DEFAULT.modes else fitting.modes
 
 
 @lru_cache(maxsize=256)
@@ -119,7 +124,7 @@ def curve(target: Target, fitting: Fitting) -> Curves:
     sweep = fa.sweep_distance(
         taken.subject.model,
         taken.observation,
-        modes=fitting.modes,
+        modes=_modes(fitting),
         box=fitting.box,
         noise_percent=fitting.prior,
         tolerance=1e-6,  # d_L to 3e-6 points, d_S to 3e-4 mm: far below a pixel of the plot

@@ -8,10 +8,10 @@ from typing import Literal
 
 import numpy as np
 
-from ..arrays import Array, read_only
+from ..arrays import Array, number, read_only, shown
 from ..camera import Camera, project
 from ..model import FaceModel, Scheme
-from ..observation import FLATTEST, Observation, eye_distance
+from ..observation import FLATTEST, MIN_POINTS, Observation, eye_distance
 from ..rotation import R0, axis_angle
 from .als import solve_alternating
 from .result import Fit, FitOptions, Jacobian, Method, Status, Weighting
@@ -34,7 +34,7 @@ def fit(
     *,
     camera: Literal["perspective", "orthographic"] = "perspective",
     distance: float | None = None,
-    modes: int = 70,
+    modes: int | None = None,
     box: float | None = 2.0,
     noise_percent: float = 1.0,
     prior_weight: float | None = None,
@@ -51,7 +51,7 @@ def fit(
     ----------
     camera: "perspective", or "orthographic" for a far-away camera (scaled orthographic projection, paper section 4.1).
     distance: t_z, metres from the camera to the model's origin, held fixed; None lets the fit choose it (perspective).
-    modes: shape modes used, the strongest first; a model with fewer uses all it has.
+    modes: shape modes used, the strongest first; None for the strongest 70, or all of a model with fewer.
     box: largest |alpha_j| in standard deviations; None for none.
     noise_percent: landmark noise the prior assumes, sd per coordinate in percent of the interocular distance; it sets
         lambda = sigma^2 in px^2.
@@ -103,9 +103,13 @@ class Task:
 
 def prepare(model: FaceModel, observation: Observation, options: FitOptions) -> Task:
     """Visible points, their rows of the model, the prior's weight in px^2; ValueError if they do not match."""
+    if not isinstance(model, FaceModel):
+        raise ValueError(f"model: {shown(model)} is not a FaceModel; load one with load_model")
+    if not isinstance(observation, Observation):
+        raise ValueError(f"observation: {shown(observation)} is not an Observation")
     visible = observation.visible
     vertices = observation.vertices(model)
-    mean, pinv, Q = landmark_rows(model, tuple(vertices[visible].tolist()), options.modes)
+    mean, pinv, Q = landmark_rows(model, tuple(vertices[visible].tolist()), options.modes_of(model))
     points = observation.points[visible] - observation.centre
     weights = np.ones(len(points)) if observation.weights is None else observation.weights[visible]
     problem = Problem(
@@ -132,6 +136,11 @@ def landmark_rows(
     Kept: a sweep, a batch or a page asks for the same ones again.
     """
     mean, modes = model.rows(np.array(vertices, dtype=np.intp))
+    different = len(set(vertices))
+    if 1 < different < MIN_POINTS:  # one alone is a line, below
+        raise ValueError(
+            f"points: on only {different} different vertices of the model; {MIN_POINTS} are needed"
+        )
     spread = np.linalg.svd(mean - mean.mean(axis=0), compute_uv=False)
     if spread[1] <= FLATTEST * spread[0]:
         raise ValueError(
@@ -163,14 +172,15 @@ def solve_from(task: Task, camera: Camera, alpha: Array, free_distance: bool = F
 
 def kappa_of(camera: str, distance: float | None) -> float:
     """1 / t_z of a camera name and a distance in metres; ValueError out of range."""
-    if camera not in ("perspective", "orthographic"):
-        raise ValueError(f"camera: {camera!r} is not perspective or orthographic")
+    if not isinstance(camera, str) or camera not in ("perspective", "orthographic"):
+        raise ValueError(f"camera: {shown(camera)} is not perspective or orthographic")
     if camera == "orthographic":
         if distance is not None:
             raise ValueError("distance: an orthographic camera has none; leave it out")
         return 0.0
     if distance is None:
         return FIRST_KAPPA
+    distance = number("distance", distance)
     if not NEAREST <= distance <= FARTHEST:  # False for NaN too
         raise ValueError(f"distance: {distance:g} m is not within {NEAREST:g} to {FARTHEST:g}")
     return 1.0 / distance

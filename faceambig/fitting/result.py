@@ -8,7 +8,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from ..arrays import Array, read_only
+from ..arrays import Array, number, read_only, shown, whole
 from ..camera import Camera, project
 from ..metrics import mean_gap_percent
 from ..model import FaceModel
@@ -17,6 +17,8 @@ from ..observation import Observation
 Weighting = Literal["reprojection", "algebraic"]
 Method = Literal["joint", "snls", "als"]
 Jacobian = Literal["kaufman", "full"]
+
+DEFAULT_MODES = 70  # shape modes of a fit that names no number
 
 
 class Status(StrEnum):
@@ -34,7 +36,9 @@ class Status(StrEnum):
 class FitOptions:
     """Options of `fit`, in the units of a user. All have defaults."""
 
-    modes: int = 70  # S, shape modes used; models with fewer use all they have
+    modes: int | None = (
+        None  # S, shape modes used; None: the strongest 70, or all of a model with fewer
+    )
     box: float | None = 2.0  # |alpha_j| <= box standard deviations; None: no box
     noise_percent: float = (
         1.0  # landmark sd per coordinate the prior assumes, % of the interocular distance
@@ -48,8 +52,15 @@ class FitOptions:
     als_rounds: int | None = 10  # rounds of method="als"; None: until a round gains nothing
 
     def __post_init__(self) -> None:
-        if self.modes < 1:
-            raise ValueError(f"modes: {self.modes} is not at least 1")
+        # Python's own numbers from here on: equal options are equal, whatever type they were given in
+        kinds = {"noise_percent": number, "tolerance": number, "max_steps": whole}
+        kinds |= {"modes": whole, "box": number, "prior_weight": number, "als_rounds": whole}
+        for name, kind in kinds.items():
+            value = getattr(self, name)
+            if value is not None or name in ("noise_percent", "tolerance", "max_steps"):
+                object.__setattr__(self, name, kind(name, value))
+        if self.modes is not None and self.modes < 1:
+            raise ValueError(f"modes: {shown(self.modes)} is not at least 1")
         if self.box is not None and not 0 < self.box <= 10:
             raise ValueError(f"box: {self.box:g} is not within 0 to 10 standard deviations")
         if not 0.001 <= self.noise_percent <= 20:
@@ -59,16 +70,27 @@ class FitOptions:
         if not 1e-14 <= self.tolerance <= 1e-2:
             raise ValueError(f"tolerance: {self.tolerance:g} is not within 1e-14 to 0.01")
         if self.max_steps < 1:
-            raise ValueError(f"max_steps: {self.max_steps} is not at least 1")
+            raise ValueError(f"max_steps: {shown(self.max_steps)} is not at least 1")
         for name, kind in (("weighting", Weighting), ("method", Method), ("jacobian", Jacobian)):
             if (value := getattr(self, name)) not in get_args(kind):
                 raise ValueError(f"{name}: {value!r} is not {' or '.join(get_args(kind))}")
         if self.als_rounds is not None and self.als_rounds < 1:
-            raise ValueError(f"als_rounds: {self.als_rounds} is not at least 1")
+            raise ValueError(f"als_rounds: {shown(self.als_rounds)} is not at least 1")
         if self.weighting == "algebraic" and self.method == "als":
             raise ValueError(
                 "method: 'als' has no algebraic weighting; leave method out and SNLS solves it"
             )
+
+    def modes_of(self, model: FaceModel) -> int:
+        """S, how many modes of `model` are used; ValueError if it has fewer than were asked for."""
+        if self.modes is None:
+            return min(DEFAULT_MODES, model.n_modes)
+        if self.modes > model.n_modes:
+            raise ValueError(
+                f"modes: {shown(self.modes)} of a model with {model.n_modes}; "
+                f"give at most {model.n_modes}, or none for its strongest {DEFAULT_MODES}"
+            )
+        return self.modes
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -170,17 +171,27 @@ def test_sweep_prints_every_fit_and_the_interval(capsys, pts, embedded, observat
     sweep = fa.sweep_distance(embedded, observation, np.geomspace(0.3, 2.4, 4))
     found = [fit["d_l_percent"] for fit in record["fits"][:-1]]
     assert found == pytest.approx(sweep.d_l_percent, rel=1e-3)
-    assert record["interval"] == {
+    interval = record["interval"]
+    assert interval.pop("best_d_l_percent") == pytest.approx(min(found), rel=1e-12)
+    assert interval == {
         "low_m": None,
         "high_m": None,
         "empty": False,
+        "pieces": 1,
         "tolerance_percent": 3.0,
     }
+    speeds = [fit["speed_mm_per_octave"] for fit in record["fits"]]
+    assert speeds[:-1] == pytest.approx(sweep.speed_mm_per_octave(), rel=1e-3)
+    assert speeds[-1] == 0  # far away the distance changes nothing
+    assert record["disagreed_distances_m"] == []
     status, out, err = printed(capsys, *asked)
     assert (status, err) == (0, "")
     rows = out.splitlines()
-    assert rows[0].split() == ["distance", "cm", "d_L", "%", "status"]
-    assert [row.split()[0] for row in rows[1:6]] == ["30", "60", "120", "240", "orthographic"]
+    assert rows[0] == "distance cm   d_L %   face changes mm per doubling   status"
+    table = [row.split() for row in rows[1:6]]
+    assert [row[0] for row in table] == ["30", "60", "120", "240", "orthographic"]
+    assert [float(row[2]) for row in table] == pytest.approx(speeds, abs=0.0051)
+    assert {row[3] for row in table} == {"converged"}
     assert "d_L stays under 3 % from the nearest tried to infinity" in out
 
 
@@ -193,7 +204,11 @@ def test_sweep_prints_every_fit_and_the_interval(capsys, pts, embedded, observat
         ),
         (fa.Interval(0.31, 1.5, False, 0.2, 0.5), "d_L stays under 0.5 % from 31 cm to 150 cm"),
         (fa.Interval(None, 1.5, False, 0.2, 3.0), "from the nearest tried to 150 cm"),
-        (fa.Interval(0.31, None, False, 0.2, 3.0), "from 31 cm to infinity"),
+        (fa.Interval(0.31, None, False, 0.2, 3.0), "from 31 cm to infinity: within"),
+        (
+            fa.Interval(0.31, 0.5, False, 0.2, 3.0, 2),
+            "to 50 cm (2 such ranges; this one holds the best): within",
+        ),
     ],
 )
 def test_an_interval_is_a_sentence(interval, words):
@@ -212,6 +227,33 @@ def test_a_fit_that_does_not_converge_is_exit_status_one(capsys, pts, monkeypatc
     assert status == 1
     assert err == ""
     assert "step limit reached" in out
+
+
+def test_a_sweep_says_where_its_two_directions_disagree(capsys, pts, monkeypatch):
+    real = fa.sweep_distance
+    monkeypatch.setattr(
+        fa, "sweep_distance",
+        lambda *a, **options: replace(real(*a, **options), disagreed=np.array([0.3, np.inf])),
+    )  # fmt: skip
+    asked = ("sweep", pts, "--from", 0.3, "--to", 0.6, "--steps", 2, "--image-size", "500x500")
+    _, out, _ = printed(capsys, *asked, "--json")
+    assert json.loads(out)["disagreed_distances_m"] == [0.3, None]
+    _, out, _ = printed(capsys, *asked)
+    assert "at 2 distances another fit came from the other side; the lower cost is kept" in out
+
+
+@pytest.mark.parametrize("command", ["fit", "sweep"])
+def test_without_the_flag_the_modes_are_those_the_model_has(
+    capsys, pts, monkeypatch, embedded, command
+):
+    monkeypatch.setattr(fa, "load_model", lambda _: embedded.truncate(12))
+    asked = (command, pts, "--json", "--image-size", "500x500")
+    status, out, _ = printed(capsys, *asked)
+    assert status == 0
+    record = json.loads(out)
+    fits = record["fits"] if command == "sweep" else [record]
+    assert {len(fit["alpha"]) for fit in fits} == {12}
+    assert "modes: 13 of a model with 12; give at most 12" in refused(capsys, *asked, "--modes", 13)
 
 
 @pytest.fixture
@@ -317,6 +359,26 @@ BAD: dict[str, tuple[list[str], str]] = {
     "distance far and orthographic": (["fit", "{pts}", "--camera", "orthographic", "--distance", "1"], "distance: "),
     "camera": (["fit", "{pts}", "--camera", "fisheye"], "camera: 'fisheye'"),
     "modes": (["fit", "{pts}", "--modes", "0"], "modes: 0"),
+    "modes more": (["fit", "{pts}", "--modes", "200"], "modes: 200 of a model with 100; give at most 100"),
+    "modes more, sweep": (["sweep", "{pts}", "--modes", "101"], "modes: 101 of a model with 100"),
+    "modes words": (["fit", "{pts}", "--modes", "all"], "'all'"),
+    "modes half": (["fit", "{pts}", "--modes", "7.5"], "'7.5'"),
+    "modes of 5000 digits": (["fit", "{pts}", "--modes", "9" * 5000], "--modes"),
+    "modes of 400 digits": (["fit", "{pts}", "--modes", "9" * 400], "modes: 999"),
+    "box zero": (["fit", "{pts}", "--box", "0"], "box: 0 is not within"),
+    "box infinity": (["sweep", "{pts}", "--box", "inf"], "box: inf is not within"),
+    "box words": (["fit", "{pts}", "--box", "none"], "'none'"),
+    "prior NaN": (["fit", "{pts}", "--prior", "nan"], "noise_percent: nan"),
+    "prior zero": (["fit", "{pts}", "--prior", "0"], "noise_percent: 0 is not within"),
+    "distance infinity": (["fit", "{pts}", "--distance", "inf"], "distance: inf m is not within"),
+    "distance zero": (["fit", "{pts}", "--distance", "0"], "distance: 0 m is not within"),
+    "distance of 400 digits": (["fit", "{pts}", "--distance", "9" * 400], "distance: inf m"),
+    "points at one place": (["fit", "{tmp}/place.pts"], "points: 68 visible, but at only 1 different places"),
+    "points at five places": (["sweep", "{tmp}/places.pts"], "points: 68 visible, but at only 5 different"),
+    "points at infinity": (["fit", "{tmp}/infinite.pts"], "infinite.pts"),
+    "points far out": (["fit", "{tmp}/far.pts"], "points: 1e+200 is not within 1e+09 pixels"),
+    "points all missing": (["sweep", "{tmp}/missing.pts"], "points: 0 visible; 6 are needed"),
+    "image size huge": (["fit", "{pts}", "--image-size", "9999999999x480"], "image_size: 1e+10 is not within"),
     "box NaN": (["fit", "{pts}", "--box", "nan"], "box: nan"),
     "prior": (["sweep", "{pts}", "--prior", "-1"], "noise_percent: -1"),
     "image size words": (["fit", "{pts}", "--image-size", "big"], "--image-size: 'big' is not like 640x480"),
@@ -360,6 +422,11 @@ def test_bad_input_is_one_line_and_exit_status_two(capsys, tmp_path, pts, observ
     (tmp_path / "cut.pts").write_text("\n".join(lines[:30]))
     five = np.where(np.arange(68)[:, None] < 5, observation.points, np.nan)
     write_pts(tmp_path / "five.pts", five)
+    write_pts(tmp_path / "place.pts", np.full((68, 2), 250.0))
+    write_pts(tmp_path / "places.pts", observation.points[np.arange(68) % 5])
+    write_pts(tmp_path / "infinite.pts", np.where(np.eye(68, 2) > 0, np.inf, observation.points))
+    write_pts(tmp_path / "far.pts", np.where(np.eye(68, 2) > 0, 1e200, observation.points))
+    write_pts(tmp_path / "missing.pts", np.full((68, 2), np.nan))
     write_pts(tmp_path / "line.pts", np.outer(np.arange(68.0), [3, 1]) + 100)
     arguments, words = BAD[name]
     filled = [

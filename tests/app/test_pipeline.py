@@ -266,3 +266,14 @@ def test_a_file_is_whole_or_not_there(tmp_path: Path, monkeypatch: pytest.Monkey
         pipeline.write(tmp_path / "no" / "a.png", b"")
     with pytest.raises(ValueError, match="is a folder, not a file"):
         pipeline.write(tmp_path, b"")
+
+
+def test_a_setting_left_alone_suits_a_model_with_fewer_modes(embedded, monkeypatch):
+    small = embedded.truncate(30)
+    monkeypatch.setattr(pipeline, "model", lambda _: small)
+    state = ViewState(model="small")
+    assert pipeline.fitted(state.target, state.fitting).alpha.shape == (30,)
+    assert len(pipeline.curve(state.target, state.fitting).distances) == 49
+    asked = changed(state, modes=31)
+    with pytest.raises(ValueError, match="modes: 31 of a model with 30; give at most 30"):
+        pipeline.fitted(asked.target, asked.fitting)
