@@ -82,7 +82,7 @@ class Sweep:
 
         The derivative of d_S: mean over the model's evaluation region of the vertices' velocity along the path, its
         rigid motion taken out, times log 2. From the tangent of each fit, not from differences of the grid: it does
-        not depend on the grid. Computed when asked for, 1 to 2 ms a distance.
+        not depend on the grid. Computed when asked for, 2 to 3 ms a distance.
         """
         chunks = range(0, len(self.fits), SPEEDS_AT_ONCE)
         return np.concatenate([path_speeds(self.fits[k : k + SPEEDS_AT_ONCE]) for k in chunks])
