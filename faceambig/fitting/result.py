@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -14,6 +15,9 @@ from ..model import FaceModel
 from ..observation import Observation
 
 DEFAULT_MODES = 70  # shape modes of a fit that names no number
+Weighting = Literal["reprojection", "algebraic"]
+Method = Literal["joint", "snls", "als"]
+Jacobian = Literal["kaufman", "full"]
 
 
 class Status(StrEnum):
@@ -23,7 +27,8 @@ class Status(StrEnum):
         "converged"  # the projected gradient vanishes: no step inside the box lowers the cost
     )
     MAX_STEPS = "step limit reached"
-    STALLED = "no further decrease"  # rounding stopped the descent before the gradient vanished
+    STALLED = "no further decrease"  # the descent came to rest before the gradient vanished
+    ROUNDS = "stopped after the given rounds"  # als_rounds of them, short of the optimum
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,11 +45,15 @@ class FitOptions:
     prior_weight: float | None = None  # lambda in px^2 itself, instead of noise_percent
     tolerance: float = 1e-8  # relative cost above the optimum that still counts as converged
     max_steps: int = 100
+    weighting: Weighting = "reprojection"  # of a landmark's residual
+    method: Method = "joint"  # the solver, see `fit`
+    jacobian: Jacobian = "kaufman"  # of the projected residual of SNLS
+    als_rounds: int | None = 10  # rounds of method="als"; None: until a round gains nothing
 
     def __post_init__(self) -> None:
         # Python's own numbers from here on: equal options are equal, whatever type they were given in
         kinds = {"noise_percent": number, "tolerance": number, "max_steps": whole}
-        kinds |= {"modes": whole, "box": number, "prior_weight": number}
+        kinds |= {"modes": whole, "box": number, "prior_weight": number, "als_rounds": whole}
         for name, kind in kinds.items():
             value = getattr(self, name)
             if value is not None or name in ("noise_percent", "tolerance", "max_steps"):
@@ -61,6 +70,21 @@ class FitOptions:
             raise ValueError(f"tolerance: {self.tolerance:g} is not within 1e-14 to 0.01")
         if self.max_steps < 1:
             raise ValueError(f"max_steps: {shown(self.max_steps)} is not at least 1")
+        for name, kind in (("weighting", Weighting), ("method", Method), ("jacobian", Jacobian)):
+            value = getattr(self, name)
+            if not isinstance(value, str) or value not in get_args(kind):
+                raise ValueError(f"{name}: {shown(value)} is not {' or '.join(get_args(kind))}")
+        if self.als_rounds is not None and self.als_rounds < 1:
+            raise ValueError(f"als_rounds: {shown(self.als_rounds)} is not at least 1")
+        if self.weighting == "algebraic" and self.method == "als":
+            raise ValueError(
+                "method: 'als' has no algebraic weighting; leave method out and SNLS solves it"
+            )
+
+    @property
+    def least_squares(self) -> bool:
+        """Whether the answer is an optimum of E: not that of the algebraic residual, nor of rounds that stop short."""
+        return self.weighting == "reprojection" and self.method != "als"
 
     def modes_of(self, model: FaceModel) -> int:
         """S, how many modes of `model` are used; ValueError if it has fewer than were asked for."""
@@ -88,11 +112,11 @@ class Fit:
     focal: float | None  # pixels; None if orthographic
     scale: float | None  # pixels per metre if orthographic, else None
     residual: Array  # (L, 2) observed minus projected, pixels; NaN where not visible
-    cost: float  # E of MATH.md 3: squared pixels, prior included, no factor 1/2
+    cost: float  # E of MATH.md 3: squared pixels, prior included, no factor 1/2; whatever the method and weighting
     prior_weight: float  # lambda, px^2
     interocular_px: float  # the distance d_L is a percentage of
     interocular_meaning: str
-    steps: int
+    steps: int  # of the solver; rounds of method="als"
     status: Status  # "converged" only if the projected gradient says so
 
     def __post_init__(self) -> None:

@@ -124,7 +124,7 @@ def descent(
         raise ValueError(
             "distance: a landmark lies behind the camera at the start; fit at a larger distance"
         )
-    low_end, high_end, here = _ends(problem)
+    lowest, highest = limits(problem)
     S, n = len(alpha), problem.unknowns
     H, factors, last = np.empty((0, 0)), {}, np.inf
     keep, whole = False, True  # whole: the last step ended on the bounds that are active
@@ -141,14 +141,12 @@ def descent(
         else:
             H, g = yield Linearised(point)
             factors = {}
-        here[:S] = point.alpha
-        if problem.free_distance:
-            here[-1] = point.view.kappa
+        here = theta_of(problem, point)
         damped = H + np.diag(mu * np.diag(H)) if mu > 0 else H
         rounds = QP_ROUNDS_EARLY[step - 1] if step <= len(QP_ROUNDS_EARLY) else QP_ROUNDS
         try:
             delta, active, solved = solve_box_qp(
-                damped, g, low_end - here, high_end - here, active, rounds, factors, there=whole
+                damped, g, lowest - here, highest - here, active, rounds, factors, there=whole
             )
         except np.linalg.LinAlgError:  # a bad point of the curved valley: damp and try again
             mu, active = max(FIRST_DAMPING, MORE_DAMPING * mu), np.zeros(n, dtype=np.int8)
@@ -160,7 +158,7 @@ def descent(
             if predicted > 0.1 * tolerance * point.cost + rounding:  # the step is known: take it
                 new = yield Trial(point, delta, 1.0)
                 point = new if new.cost < point.cost else point
-            return _solution(problem, point, step, Status.CONVERGED)
+            return solution_at(problem, point, step, Status.CONVERGED)
         moved = yield from _line_search(point, delta, slope)
         if moved is None:
             whole = False
@@ -168,7 +166,7 @@ def descent(
                 keep = False
                 continue
             if mu > 1e3 or (mu == 0 and solved and predicted <= 1e-12 * point.cost):
-                return _solution(problem, point, step, Status.STALLED)
+                return solution_at(problem, point, step, Status.STALLED)
             mu = max(FIRST_DAMPING, 10 * MORE_DAMPING * mu)
             continue
         point, length, whole = moved
@@ -179,23 +177,32 @@ def descent(
             mu = max(FIRST_DAMPING, MORE_DAMPING * mu)
         else:
             mu = mu / 10 if mu > FIRST_DAMPING else 0.0
-    return _solution(problem, point, max_steps, Status.MAX_STEPS)
+    return solution_at(problem, point, max_steps, Status.MAX_STEPS)
 
 
-def _solution(problem: Problem, point: Point, steps: int, status: Status) -> Solution:
+def solution_at(problem: Problem, point: Point, steps: int, status: Status) -> Solution:
     # A step to the bound may pass it by a rounding
     alpha = point.alpha.clip(-problem.box, problem.box)
     return Solution(alpha, _camera(point.view), point.cost, steps, status)
 
 
-def _ends(problem: Problem) -> tuple[Array, Array, Array]:
-    """Lowest and highest theta (n,), the box and the distances between infinity and the nearest; and zeros (n,)."""
+def limits(problem: Problem) -> tuple[Array, Array]:
+    """Lowest and highest theta (n,): the box, and the distances between infinity and the nearest."""
     S, n = problem.modes.shape[2], problem.unknowns
     low, high = np.full(n, -np.inf), np.full(n, np.inf)
     low[:S], high[:S] = -problem.box, problem.box
     if problem.free_distance:
         low[-1], high[-1] = 0.0, NEAREST_KAPPA
-    return low, high, np.zeros(n)
+    return low, high
+
+
+def theta_of(problem: Problem, point: Point) -> Array:
+    """(n,) what has limits, alpha and a free kappa; the rest counts from the point: zeros."""
+    theta = np.zeros(problem.unknowns)
+    theta[: len(point.alpha)] = point.alpha
+    if problem.free_distance:
+        theta[-1] = point.view.kappa
+    return theta
 
 
 def _line_search(
@@ -275,6 +282,11 @@ def evaluate(problem: Problem, view: View, alpha: Array) -> Point:
     return Point(alpha, view, seen, e, float(E))
 
 
+def cost(problem: Problem, camera: Camera, alpha: Array) -> float:
+    """E of MATH.md 3 in px^2; inf if a landmark is behind the camera."""
+    return evaluate(problem, camera.view, alpha).cost
+
+
 def residuals(problem: Problem, alpha: Array, view: View) -> tuple[Seen, Array, Array]:
     """(seen, e (..., L, 2), E (...)) of faces alpha (..., S) in views: the landmarks seen, residuals and costs."""
     S = alpha.shape[-1]
@@ -337,13 +349,9 @@ def gradient(problem: Problem, alpha: Array, view: View, seen: Seen, e: Array) -
 
 def kkt_error(problem: Problem, solution: Solution) -> float:
     """Largest violation of the optimality conditions, each scaled by sqrt(E H_jj): 0 at a constrained optimum."""
-    S = len(solution.alpha)
-    alpha, view, seen, e, _ = evaluate(problem, solution.camera.view, solution.alpha)
-    H, g = normal_equations(problem, alpha, view, seen, e)
-    low, high, theta = _ends(problem)
-    theta[:S] = solution.alpha
-    if problem.free_distance:
-        theta[-1] = solution.camera.kappa
+    point = evaluate(problem, solution.camera.view, solution.alpha)
+    H, g = normal_equations(problem, *point[:4])
+    (low, high), theta = limits(problem), theta_of(problem, point)
     violated = np.where(
         theta <= low, np.maximum(g, 0), np.where(theta >= high, np.maximum(-g, 0), np.abs(g))
     )
