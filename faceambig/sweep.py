@@ -83,8 +83,18 @@ class Sweep:
 
         The derivative of d_S: mean over the model's evaluation region of the vertices' velocity along the path, its
         rigid motion taken out, times log 2. From the tangent of each fit, not from differences of the grid: it does
-        not depend on the grid. Computed when asked for, 1 to 2 ms a distance.
+        not depend on the grid. Computed when asked for, 2 to 3 ms a distance.
+
+        Raises
+        ------
+        ValueError: the fits are no optimum of E (weighting="algebraic", method="als"), so they have no tangent.
         """
+        options = self.orthographic.options
+        if not options.least_squares:
+            raise ValueError(
+                f"method: {options.method!r}, weighting {options.weighting!r}: no optimum of E, its path has no "
+                "speed; sweep with method='joint'"
+            )
         chunks = range(0, len(self.fits), SPEEDS_AT_ONCE)
         return np.concatenate([path_speeds(self.fits[k : k + SPEEDS_AT_ONCE]) for k in chunks])
 
@@ -140,7 +150,9 @@ def sweep_distance(
     ----------
     distances: (n,) metres in any order, each kept once; None: 49 from 0.2 to 3 m, evenly in ratio. Two neighbours
         may be far apart: the path between them need not be followed closely, only less steps are saved.
-    modes, box, ...: as `fit`.
+    modes, box, noise_percent, prior_weight, tolerance, max_steps, weighting, method, jacobian, als_rounds: as `fit`.
+        Answers that are no optimum of E (weighting="algebraic", method="als") cannot be compared by their cost: no
+        second direction is tried with them.
 
     Raises
     ------
@@ -164,9 +176,8 @@ def sweep_distance(
     task = prepare(model, observation, options)
     kappas = [0.0, *(1.0 / grid[::-1]).tolist()]
     path = follow(task, kappas, _cold(task, 0.0))
-    arrival = _cold(task, kappas[-1])
     disagreed: list[float] = []
-    if _differ(task, path[-1], arrival):
+    if options.least_squares and _differ(task, path[-1], arrival := _cold(task, kappas[-1])):
         back = follow(task, kappas[::-1], arrival)[::-1]
         pairs = list(zip(path, back, strict=True))
         disagreed = [a.distance or np.inf for a, b in pairs if _differ(task, a, b)]

@@ -81,10 +81,11 @@ def photographed(**change: Any) -> fa.Observation:
     return fa.observe(**asked | change)
 
 
-OPTIONS = ("modes", "box", "noise_percent", "prior_weight", "tolerance", "max_steps")
+OPTIONS = ("modes", "box", "noise_percent", "prior_weight", "tolerance", "max_steps", "als_rounds")
+WORDS = ("weighting", "method", "jacobian")
 BORDERS: dict[str, tuple[Callable[..., Any], str]] = {
-    **{f"fit {name}": (fitted, name) for name in (*OPTIONS, "camera", "distance")},
-    **{f"sweep {name}": (swept, name) for name in (*OPTIONS, "distances")},
+    **{f"fit {name}": (fitted, name) for name in (*OPTIONS, *WORDS, "camera", "distance")},
+    **{f"sweep {name}": (swept, name) for name in (*OPTIONS, *WORDS, "distances")},
     **{
         f"Observation {name}": (observed, name)
         for name in ("points", "scheme", "image_size", "principal_point", "weights")

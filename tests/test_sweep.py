@@ -127,6 +127,17 @@ def test_where_two_ways_disagree_the_lower_cost_is_kept_and_said():
         assert fit.cost == pytest.approx(min(a.cost, b.cost), rel=1e-6)
 
 
+@pytest.mark.parametrize("options", [{"method": "als"}, {"weighting": "algebraic"}])
+def test_answers_that_are_no_optimum_have_no_second_direction_and_no_speed(options):
+    sweep = fa.sweep_distance(MODEL, drawn(1), [0.4, 1.0], **options)
+    assert len(sweep.disagreed) == 0
+    with pytest.raises(ValueError, match="no optimum of E, its path has no speed"):
+        sweep.speed_mm_per_octave()
+    snls = fa.sweep_distance(MODEL, drawn(1), [0.4, 1.0], method="snls")
+    joint = fa.sweep_distance(MODEL, drawn(1), [0.4, 1.0])
+    assert snls.speed_mm_per_octave() == pytest.approx(joint.speed_mm_per_octave(), rel=1e-3)
+
+
 def test_a_distance_given_twice_is_fitted_once():
     observation = drawn(2)
     sweep = fa.sweep_distance(MODEL, observation, [1.0, 0.3, 1.0, 0.3, 0.3])

@@ -14,11 +14,10 @@ from ..metrics import mean_gap_percent
 from ..model import FaceModel
 from ..observation import Observation
 
+DEFAULT_MODES = 70  # shape modes of a fit that names no number
 Weighting = Literal["reprojection", "algebraic"]
 Method = Literal["joint", "snls", "als"]
 Jacobian = Literal["kaufman", "full"]
-
-DEFAULT_MODES = 70  # shape modes of a fit that names no number
 
 
 class Status(StrEnum):
@@ -72,14 +71,20 @@ class FitOptions:
         if self.max_steps < 1:
             raise ValueError(f"max_steps: {shown(self.max_steps)} is not at least 1")
         for name, kind in (("weighting", Weighting), ("method", Method), ("jacobian", Jacobian)):
-            if (value := getattr(self, name)) not in get_args(kind):
-                raise ValueError(f"{name}: {value!r} is not {' or '.join(get_args(kind))}")
+            value = getattr(self, name)
+            if not isinstance(value, str) or value not in get_args(kind):
+                raise ValueError(f"{name}: {shown(value)} is not {' or '.join(get_args(kind))}")
         if self.als_rounds is not None and self.als_rounds < 1:
             raise ValueError(f"als_rounds: {shown(self.als_rounds)} is not at least 1")
         if self.weighting == "algebraic" and self.method == "als":
             raise ValueError(
                 "method: 'als' has no algebraic weighting; leave method out and SNLS solves it"
             )
+
+    @property
+    def least_squares(self) -> bool:
+        """Whether the answer is an optimum of E: not that of the algebraic residual, nor of rounds that stop short."""
+        return self.weighting == "reprojection" and self.method != "als"
 
     def modes_of(self, model: FaceModel) -> int:
         """S, how many modes of `model` are used; ValueError if it has fewer than were asked for."""
