@@ -22,8 +22,8 @@ from timing import about, compare
 
 import faceambig as fa
 from faceambig.arrays import Array
-from faceambig.fitting import start_pose
 from faceambig.fitting.solve import Problem, solve
+from faceambig.fitting.start import centred_pinv, start_pose
 from faceambig.model import Scheme
 
 PRIOR_WEIGHT, ROUNDS = 90.0, 50
@@ -51,7 +51,8 @@ def main() -> int:
     basis = shape.get_rescaled_pca_basis().astype(float)
     modes = 1e-3 * basis.reshape(-1, 3, basis.shape[1])[vertices]
     seen = points[rows]
-    problem = Problem(seen, np.ones(len(seen)), mean, modes, PRIOR_WEIGHT, np.inf)
+    pinv = centred_pinv(mean)
+    problem = Problem(seen, np.ones(len(seen)), mean, pinv, modes, PRIOR_WEIGHT, np.inf)
     zero = np.zeros(modes.shape[2])
     model = landmarks_as_model(mean, modes, tuple(ids))
     observation = fa.Observation(seen, "ibug", image_size=SIZE)

@@ -19,9 +19,10 @@ from timing import compare
 
 import faceambig as fa
 from faceambig.arrays import Array
-from faceambig.fitting import prepare, start_pose
 from faceambig.fitting.boxqp import solve_box_qp
 from faceambig.fitting.solve import solve
+from faceambig.fitting.start import start_pose
+from faceambig.fitting.task import prepare
 
 CASES, ROUNDS = 50, 1
 SAME = 1e-6  # relative cost above the best known that still counts as the optimum

@@ -32,8 +32,9 @@ from problems import (
 from timing import about, compare
 
 import faceambig as fa
-from faceambig.fitting import FIRST_KAPPA, prepare, solve_from, start_pose
 from faceambig.fitting.solve import solve
+from faceambig.fitting.start import start_pose
+from faceambig.fitting.task import FIRST_KAPPA, prepare, solve_from
 
 ROUNDS = 2
 LOOSE = 1e-6  # the second stop that is timed; the first is the default, 1e-8

@@ -29,8 +29,9 @@ import numpy as np
 
 import faceambig as fa
 from faceambig.camera import Camera, depths, project
-from faceambig.fitting import FIRST_KAPPA, prepare, start_pose
 from faceambig.fitting.solve import Problem, Solution, solve
+from faceambig.fitting.start import start_pose
+from faceambig.fitting.task import FIRST_KAPPA, prepare
 from faceambig.observation import portrait_camera
 from faceambig.rotation import rotation_from_angles, rotation_matrix
 

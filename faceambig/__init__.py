@@ -12,7 +12,7 @@ After A. Bas and W. A. P. Smith, "What does 2D geometric information really tell
 from __future__ import annotations
 
 from .errors import AssetError
-from .fitting import Fit, FitOptions, Status, fit
+from .fitting import Failure, Fit, FitOptions, Status, fit, fit_batch
 from .flex import FlexibilityModes, flexibility_modes
 from .io import load_landmarks, load_model
 from .model import FaceModel, Scheme, Subject
@@ -22,6 +22,7 @@ from .sweep import Interval, Sweep, sweep_distance
 __all__ = [
     "AssetError",
     "FaceModel",
+    "Failure",
     "Fit",
     "FitOptions",
     "FlexibilityModes",
@@ -32,6 +33,7 @@ __all__ = [
     "Subject",
     "Sweep",
     "fit",
+    "fit_batch",
     "flexibility_modes",
     "load_landmarks",
     "load_model",

@@ -16,7 +16,8 @@ from scipy.special import gammaln
 
 from .arrays import Array, read_only, shown, whole
 from .camera import jacobian
-from .fitting import Fit, landmark_rows
+from .fitting import Fit
+from .fitting.task import landmark_rows
 from .model import FaceModel
 
 DIRECTIONS = (("wider", "narrower"), ("up", "down"), ("forward", "back"))

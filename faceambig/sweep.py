@@ -20,9 +20,10 @@ from numpy.typing import ArrayLike
 
 from .arrays import Array, checked, number, read_only
 from .camera import Camera, depths
-from .fitting import FARTHEST, NEAREST, Fit, FitOptions, Task, prepare, solve_from, start_pose
+from .fitting import Fit, FitOptions
 from .fitting.result import Jacobian, Method, Weighting
 from .fitting.tangent import tangent
+from .fitting.task import FARTHEST, NEAREST, Task, prepare, solve_from, start_of
 from .metrics import HUMAN_TOLERANCE_PERCENT
 from .model import FaceModel
 from .observation import Observation
@@ -228,7 +229,7 @@ def _unrigid(shape: Array, velocity: Array) -> Array:
 
 def _cold(task: Task, kappa: float) -> Fit:
     """The fit from the closed-form pose, which knows no other."""
-    return solve_from(task, start_pose(task.problem, kappa), np.zeros(task.problem.modes.shape[2]))
+    return solve_from(task, *start_of(task, kappa))
 
 
 def _differ(task: Task, a: Fit, b: Fit) -> bool:
@@ -249,7 +250,7 @@ def _start(task: Task, last: Sequence[Fit], kappa: float) -> tuple[Camera, Array
         _carried_on(last, kappa) if carried else (replace(still.camera, kappa=kappa), still.alpha)
     )
     if (depths(camera, task.problem.mean + task.problem.modes @ alpha) <= 0).any():
-        return start_pose(task.problem, kappa), np.zeros_like(alpha)
+        return start_of(task, kappa)
     return camera, alpha
 
 

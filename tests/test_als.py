@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 
 import faceambig as fa
 from faceambig.camera import Camera
-from faceambig.fitting import prepare, solve_from, start_pose
 from faceambig.fitting.als import solve_alternating
+from faceambig.fitting.start import start_pose
+from faceambig.fitting.task import prepare, solve_from
 from faceambig.metrics import surface_difference
 from strategies import face_of, tiny_model
 

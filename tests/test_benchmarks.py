@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 import faceambig as fa
-from faceambig.fitting import prepare, start_pose
 from faceambig.fitting.solve import Problem, solve
+from faceambig.fitting.start import start_pose
+from faceambig.fitting.task import prepare
 from strategies import tiny_model
 
 MODEL = tiny_model(n_vertices=24, n_modes=6, seed=4)

@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 
 import faceambig as fa
 from faceambig.camera import Camera, project
-from faceambig.fitting import prepare, start_pose
 from faceambig.fitting.result import FitOptions
 from faceambig.fitting.solve import Solution, kkt_error, solve
+from faceambig.fitting.start import start_pose
+from faceambig.fitting.task import prepare
 from faceambig.rotation import angles_from_rotation, rotation_matrix
 from reference import trf
 from strategies import face_of, tiny_model

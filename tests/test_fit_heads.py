@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import faceambig as fa
-from faceambig.fitting import prepare, start_pose
 from faceambig.fitting.result import FitOptions
 from faceambig.fitting.solve import Solution, kkt_error, solve
+from faceambig.fitting.start import start_pose
+from faceambig.fitting.task import prepare
 from faceambig.metrics import surface_difference
 from reference import trf
 from strategies import face_of

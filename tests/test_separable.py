@@ -13,7 +13,6 @@ from scipy.optimize import least_squares
 
 import faceambig as fa
 from faceambig.camera import Camera, project
-from faceambig.fitting import prepare, start_pose
 from faceambig.fitting.result import Weighting
 from faceambig.fitting.separable import (
     WIDEST_VIEW,
@@ -26,6 +25,8 @@ from faceambig.fitting.separable import (
     separate,
 )
 from faceambig.fitting.solve import Problem, Solution
+from faceambig.fitting.start import start_pose
+from faceambig.fitting.task import prepare
 from faceambig.rotation import R0, rotation_jacobian, rotation_matrix
 from strategies import face_of, tiny_model
 

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 import faceambig as fa
 from faceambig.camera import jacobian
-from faceambig.fitting import prepare, start_pose
 from faceambig.fitting.solve import Problem, evaluate, gradient, normal_equations, solve
+from faceambig.fitting.start import start_pose
+from faceambig.fitting.task import prepare
 from strategies import cameras, face_of, tiny_model
 
 MODEL = tiny_model(n_vertices=24, n_modes=6, seed=4)

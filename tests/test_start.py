@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import faceambig as fa
-from faceambig.fitting import prepare
+from faceambig.fitting.task import prepare
 from faceambig.sweep import sweep_distance
 
 FILE = Path(__file__).resolve().parents[1] / "benchmarks" / "start_anywhere.py"

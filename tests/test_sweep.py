@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import faceambig as fa
-from faceambig import fitting
 from faceambig.fitting.tangent import tangent
+from faceambig.fitting.task import prepare, solve_from, start_of
 from faceambig.metrics import surface_difference
 from faceambig.rotation import axis_angle
 from faceambig.sweep import END_TOLERANCE, follow
@@ -71,14 +71,9 @@ def test_neither_the_density_nor_the_order_of_the_distances_matters(seed, steps,
 
 def both_ways(model: fa.FaceModel, observation: fa.Observation, grid: np.ndarray, **options):
     """(fits of the path from far away, of the path from the nearest distance), each D + 1, far away first."""
-    task = fitting.prepare(model, observation, fa.FitOptions(**options))
+    task = prepare(model, observation, fa.FitOptions(**options))
     kappas = [0.0, *(1 / np.sort(grid)[::-1]).tolist()]
-    ends = [
-        fitting.solve_from(
-            task, fitting.start_pose(task.problem, kappa), 0 * task.problem.modes[0, 0]
-        )
-        for kappa in (0.0, kappas[-1])
-    ]
+    ends = [solve_from(task, *start_of(task, kappa)) for kappa in (0.0, kappas[-1])]
     return follow(task, kappas, ends[0]), follow(task, kappas[::-1], ends[1])[::-1]
 
 
@@ -173,7 +168,7 @@ def test_the_tangent_is_what_neighbouring_fits_differ_by(seed, distance, box, we
     if (held[0] != held[1]).any() or (held[1] != held[2]).any():
         return  # a coefficient reaches the box just here: no two-sided derivative
     difference = motion(near, far) / (2 * h)
-    found = tangent(fitting.prepare(MODEL, observation, fit.options).problem, fit.camera, fit.alpha)
+    found = tangent(prepare(MODEL, observation, fit.options).problem, fit.camera, fit.alpha)
     assert np.linalg.norm(found - difference) < 1e-4 * np.linalg.norm(difference)
     assert (found[:6][held[1]] == 0).all()
 
@@ -181,7 +176,7 @@ def test_the_tangent_is_what_neighbouring_fits_differ_by(seed, distance, box, we
 def test_far_away_nothing_moves_with_the_distance():
     observation = drawn(1)
     fit = fa.fit(MODEL, observation, camera="orthographic")
-    task = fitting.prepare(MODEL, observation, fit.options)
+    task = prepare(MODEL, observation, fit.options)
     assert (tangent(task.problem, fit.camera, fit.alpha) == 0).all()
     # alpha goes to its limit like 1 / t_z, so the speed falls by half with each doubling
     speeds = fa.sweep_distance(MODEL, observation, [50.0, 100.0, 200.0]).speed_mm_per_octave()

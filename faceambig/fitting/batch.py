@@ -17,6 +17,7 @@ import numpy as np
 from ..arrays import Array
 from ..camera import Camera, Seen, View
 from ..rotation import rotation_matrix
+from .result import FitOptions
 from .solve import (
     POSE,
     Gradient,
@@ -30,6 +31,7 @@ from .solve import (
     normal_equations,
     residuals,
 )
+from .task import solve_by
 
 CHUNK = 64  # faces side by side: their J fill 5 MB; fewer cost more calls, more leave the cache (PEERS.md 2)
 
@@ -47,13 +49,14 @@ Answer = Solution | ValueError  # the error of a face that cannot be fitted stan
 
 def solve_batch(
     starts: Sequence[Start],
+    options: FitOptions,
     *,
-    tolerance: float,
-    max_steps: int,
     n_jobs: int,
     progress: Callable[[int], object] | None,
 ) -> list[Answer]:
-    """As `solve` for every start, in order. `progress` hears how many faces are done since it last heard."""
+    """As `solve_by` for every start, in order. `progress` hears how many faces are done since it last heard."""
+    if n_jobs == 0:
+        raise ValueError("n_jobs: 0 is no number of processes; give 1 or more, or -1 for all cores")
     alike: dict[tuple[int, float, bool], list[int]] = defaultdict(list)
     for row, (problem, _, _) in enumerate(starts):
         alike[id(problem.modes), problem.box, problem.free_distance].append(row)
@@ -64,7 +67,7 @@ def solve_batch(
     ]
     answers: list[Answer] = [ValueError("not solved")] * len(starts)
     jobs = ([starts[row] for row in rows] for rows in chunks)
-    for rows, solved in zip(chunks, _run(jobs, tolerance, max_steps, n_jobs), strict=True):
+    for rows, solved in zip(chunks, _run(jobs, options, n_jobs), strict=True):
         for row, answer in zip(rows, solved, strict=True):
             answers[row] = answer
         if progress is not None:
@@ -72,20 +75,30 @@ def solve_batch(
     return answers
 
 
-def _run(
-    jobs: Iterable[list[Start]], tolerance: float, max_steps: int, n_jobs: int
-) -> Iterator[list[Answer]]:
+def _run(jobs: Iterable[list[Start]], options: FitOptions, n_jobs: int) -> Iterator[list[Answer]]:
     if n_jobs == 1:
-        return (solve_together(job, tolerance, max_steps) for job in jobs)
+        return (_solve_chunk(job, options) for job in jobs)
     try:
         from joblib import Parallel, delayed
     except ImportError as error:
         raise ValueError(
             f"n_jobs: {n_jobs} processes need joblib; pip install 'faceambig[batch]'"
         ) from error
-    work = delayed(solve_together)
+    work = delayed(_solve_chunk)
     parallel: Any = Parallel(n_jobs=n_jobs, return_as="generator")
-    return iter(parallel(work(job, tolerance, max_steps) for job in jobs))
+    return iter(parallel(work(job, options) for job in jobs))
+
+
+def _solve_chunk(starts: Sequence[Start], options: FitOptions) -> list[Answer]:
+    if options.method == "joint" and options.weighting == "reprojection":
+        return solve_together(starts, options.tolerance, options.max_steps)
+    answers: list[Answer] = []
+    for start in starts:
+        try:
+            answers.append(solve_by(*start, options))
+        except ValueError as error:
+            answers.append(error)
+    return answers
 
 
 def solve_together(starts: Sequence[Start], tolerance: float, max_steps: int) -> list[Answer]:

@@ -147,3 +147,16 @@ class Fit:
         mean, modes = self.model.rows(self.observation.vertices(self.model))
         points = mean + modes[:, :, : len(self.alpha)] @ self.alpha
         return project(self.camera, points) + self.observation.centre
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Failure:
+    """The row of a batch whose face could not be fitted."""
+
+    observation: Observation
+    message: str  # what `fit` says in its ValueError
+
+    @property
+    def converged(self) -> bool:
+        """False: filter the rows of a batch by it."""
+        return False

@@ -20,12 +20,12 @@ BEHIND = math.sin(math.radians(7.2))
 REFINED_NOISE = 0.00065  # metres of landmark noise, sd: 1 % of the distance of the eyes
 
 
-def pose_from_points(points: Array, mean: Array, mean_pinv: Array, kappa: float) -> Camera:
-    """Camera that maps the mean landmarks (L, 3), metres, near the points (L, 2), pixels from the principal point.
+def pose_from_points(points: Array, mean: Array, mean_pinv: Array) -> Camera:
+    """Orthographic camera that maps the mean landmarks (L, 3), metres, near the points (L, 2), pixels from the centre.
 
     Least squares affine map of the centred points, `mean_pinv` (3, L) being the pseudo-inverse of the centred mean
     landmarks; its 2 x 3 part made orthonormal by the polar decomposition, s the mean singular value; the third row is
-    their cross product, so det R = +1 always. s is corrected for the depth of the landmarks at distance 1 / kappa.
+    their cross product, so det R = +1 always.
     """
     count = len(points)
     x_mean, v_mean = points.sum(axis=0) / count, mean.sum(axis=0) / count
@@ -34,10 +34,20 @@ def pose_from_points(points: Array, mean: Array, mean_pinv: Array, kappa: float)
     R = np.empty((3, 3))
     R[:2] = U @ Vt
     R[2] = _cross(*R[:2].tolist())
-    q = R @ v_mean
-    depth = 1.0 + kappa * float(q[2])
-    s = float(sv[0] + sv[1]) / 2 * depth
-    return Camera(R, x_mean * (depth / s) - q[:2], s, kappa)
+    s = float(sv[0] + sv[1]) / 2
+    return Camera(R, x_mean / s - R[:2] @ v_mean, s, 0.0)
+
+
+def at_distance(pose: Camera, mean: Array, kappa: float) -> Camera:
+    """An orthographic pose of the mean landmarks (L, 3) at kappa = 1 / t_z: larger, as far as they lie beyond t_z."""
+    depth = 1.0 + kappa * float(pose.R[2] @ mean.sum(axis=0)) / len(mean)
+    return Camera(pose.R, pose.t, pose.s * depth, kappa)
+
+
+def start_pose(problem: Problem, kappa: float) -> Camera:
+    """Where the fit of a problem at kappa = 1 / t_z starts."""
+    pose = pose_from_points(problem.points, problem.mean, problem.mean_pinv)
+    return at_distance(pose, problem.mean, kappa)
 
 
 def centred_pinv(mean: Array) -> Array:
