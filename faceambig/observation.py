@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -151,8 +152,8 @@ def _within(name: str, pixels: Array) -> None:
 
 def eye_distance(points: Array, scheme: Scheme) -> float:
     """Distance of the eye centres of `points` (L, k) in scheme order, in their unit; NaN if one is missing."""
-    right, left = (points[list(rows)].mean(axis=0) for rows in scheme.eyes)
-    return float(np.linalg.norm(left - right))
+    right, left = (points[list(rows)].sum(axis=0) / len(rows) for rows in scheme.eyes)
+    return math.dist(left.tolist(), right.tolist())
 
 
 def portrait_camera(

@@ -20,6 +20,7 @@ from ..rotation import rotation_matrix
 from .result import FitOptions
 from .solve import (
     POSE,
+    First,
     Gradient,
     Linearised,
     Point,
@@ -106,7 +107,7 @@ def solve_together(starts: Sequence[Start], tolerance: float, max_steps: int) ->
     many = _together([start.problem for start in starts])
     works = [descent(*start, tolerance, max_steps) for start in starts]
     answers: list[Answer] = [ValueError("not solved")] * len(works)
-    asked: dict[type, dict[int, Any]] = {Trial: {}, Linearised: {}, Gradient: {}}
+    asked: dict[type, dict[int, Any]] = {First: {}, Trial: {}, Linearised: {}, Gradient: {}}
 
     def go_on(row: int, said: Any) -> None:
         try:
@@ -131,6 +132,9 @@ def solve_together(starts: Sequence[Start], tolerance: float, max_steps: int) ->
 def _say(many: Problem, kind: type, requests: dict[int, Any]) -> list[Any]:
     """What each row asked for, all of one kind, in one computation."""
     part = _rows(many, list(requests))
+    if kind is First:
+        alpha, views = zip(*requests.values(), strict=True)
+        return _points(part, np.stack(alpha), _stacked(views))
     points = [request.point for request in requests.values()]
     alpha = np.stack([point.alpha for point in points])
     view = _stacked([point.view for point in points])

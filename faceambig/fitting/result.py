@@ -13,6 +13,7 @@ from ..camera import Camera, project
 from ..metrics import mean_gap_percent
 from ..model import FaceModel
 from ..observation import Observation
+from ..rotation import R0, axis_angle
 
 DEFAULT_MODES = 70  # shape modes of a fit that names no number
 Weighting = Literal["reprojection", "algebraic"]
@@ -107,10 +108,6 @@ class Fit:
     options: FitOptions
     camera: Camera  # (U); pixels from the principal point
     alpha: Array  # (S,) shape, in standard deviations
-    rotation: Array  # (3,) axis-angle, radians; 0 is a frontal face (MATH.md 1)
-    translation: Array  # (3,) metres, camera axes; (2,) if orthographic
-    focal: float | None  # pixels; None if orthographic
-    scale: float | None  # pixels per metre if orthographic, else None
     residual: Array  # (L, 2) observed minus projected, pixels; NaN where not visible
     cost: float  # E of MATH.md 3: squared pixels, prior included, no factor 1/2; whatever the method and weighting
     prior_weight: float  # lambda, px^2
@@ -120,13 +117,34 @@ class Fit:
     status: Status  # "converged" only if the projected gradient says so
 
     def __post_init__(self) -> None:
-        for name in ("alpha", "rotation", "translation", "residual"):
+        for name in ("alpha", "residual"):
             object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
     def converged(self) -> bool:
         """Whether the result can be relied on."""
         return self.status is Status.CONVERGED
+
+    @property
+    def rotation(self) -> Array:
+        """Axis-angle (3,), radians; 0 is a frontal face (MATH.md 1)."""
+        return read_only(axis_angle(self.camera.R @ R0))
+
+    @property
+    def translation(self) -> Array:
+        """(3,) metres, camera axes; (2,), t_2d, if orthographic."""
+        t_z = self.camera.distance
+        return self.camera.t if t_z is None else read_only(np.array([*self.camera.t, t_z]))
+
+    @property
+    def focal(self) -> float | None:
+        """f in pixels, None if orthographic."""
+        return self.camera.focal
+
+    @property
+    def scale(self) -> float | None:
+        """Pixels per metre if orthographic, else None."""
+        return self.camera.s if self.camera.kappa == 0 else None
 
     @property
     def distance(self) -> float | None:

@@ -64,6 +64,12 @@ class Problem:
     def __post_init__(self) -> None:
         object.__setattr__(self, "weighted", bool((self.weights != 1).any()))
 
+    def landmarks(self, alpha: Array) -> Array:
+        """(..., L, 3) of faces alpha (..., S), metres, model axes."""
+        S = alpha.shape[-1]
+        flat = self.mean.ravel() + alpha @ self.modes.reshape(-1, S).T
+        return flat.reshape(*alpha.shape[:-1], -1, 3)
+
     @property
     def unknowns(self) -> int:
         """n, the length of theta."""
@@ -91,6 +97,13 @@ class Point(NamedTuple):
     cost: float  # E of MATH.md 3, px^2; inf if a landmark is behind the camera
 
 
+class First(NamedTuple):
+    """Asks for the Point of the start."""
+
+    alpha: Array
+    view: View
+
+
 class Trial(NamedTuple):
     """Asks for the Point a fraction of a step away."""
 
@@ -111,7 +124,7 @@ class Gradient(NamedTuple):
     point: Point
 
 
-Request = Trial | Linearised | Gradient
+Request = First | Trial | Linearised | Gradient
 Descent = Generator[Request, Any, Solution]
 
 
@@ -119,7 +132,7 @@ def descent(
     problem: Problem, camera: Camera, alpha: Array, tolerance: float, max_steps: int
 ) -> Descent:
     """The method, from a start; yields what it wants to know and is sent the answer."""
-    point = evaluate(problem, camera.view, alpha)
+    point = yield First(alpha, camera.view)
     if point.cost == np.inf:
         raise ValueError(
             "distance: a landmark lies behind the camera at the start; fit at a larger distance"
@@ -268,6 +281,8 @@ def solve(
 
 
 def _answer(problem: Problem, request: Request) -> Any:
+    if isinstance(request, First):
+        return evaluate(problem, request.view, request.alpha)
     if isinstance(request, Trial):
         point, delta, length = request
         S, step = len(point.alpha), length * delta
@@ -289,9 +304,7 @@ def cost(problem: Problem, camera: Camera, alpha: Array) -> float:
 
 def residuals(problem: Problem, alpha: Array, view: View) -> tuple[Seen, Array, Array]:
     """(seen, e (..., L, 2), E (...)) of faces alpha (..., S) in views: the landmarks seen, residuals and costs."""
-    S = alpha.shape[-1]
-    v = problem.mean.ravel() + alpha @ problem.modes.reshape(-1, S).T
-    seen = see(view, v.reshape(*alpha.shape[:-1], -1, 3))
+    seen = see(view, problem.landmarks(alpha))
     e = problem.points - seen.xy
     flat = e.reshape(*alpha.shape[:-1], -1)
     weighted = (

@@ -11,7 +11,6 @@ from ..arrays import Array, number, read_only, shown
 from ..camera import Camera, project
 from ..model import FaceModel, Scheme
 from ..observation import FLATTEST, MIN_POINTS, Observation, eye_distance
-from ..rotation import R0, axis_angle
 from .als import solve_alternating
 from .result import Fit, FitOptions
 from .separable import solve_separable
@@ -48,19 +47,16 @@ def prepare(model: FaceModel, observation: Observation, options: FitOptions) -> 
     vertices = observation.vertices(model)
     mean, pinv, Q = landmark_rows(model, tuple(vertices[visible].tolist()), options.modes_of(model))
     points = observation.points[visible] - observation.centre
-    weights = np.ones(len(points)) if observation.weights is None else observation.weights[visible]
-    problem = Problem(
-        points, weights, mean, pinv, Q, 0.0, np.inf if options.box is None else options.box
-    )
     pose = pose_from_points(points, mean, pinv)
-    refuse_face_from_behind(problem, pose)
     interocular, meaning = _interocular(model, observation, pose)
     lam = options.prior_weight
     if lam is None:
-        lam = (
-            options.noise_percent / 100 * interocular
-        ) ** 2  # MATH.md 3: the MAP estimate has lambda = sigma^2
-    problem = replace(problem, prior_weight=lam)
+        # MATH.md 3: the MAP estimate has lambda = sigma^2
+        lam = (options.noise_percent / 100 * interocular) ** 2
+    weights = np.ones(len(points)) if observation.weights is None else observation.weights[visible]
+    box = np.inf if options.box is None else options.box
+    problem = Problem(points, weights, mean, pinv, Q, lam, box)
+    refuse_face_from_behind(problem, pose)
     return Task(model, observation, options, problem, pose, interocular, meaning)
 
 
@@ -151,20 +147,16 @@ def _interocular(model: FaceModel, observation: Observation, pose: Camera) -> tu
 def answer(task: Task, solution: Solution) -> Fit:
     """The solution as a Fit."""
     camera, problem, observation = solution.camera, task.problem, task.observation
-    residual = np.full(observation.points.shape, np.nan)
-    v = problem.mean + problem.modes @ solution.alpha
-    residual[observation.visible] = problem.points - project(camera, v)
-    perspective = camera.kappa > 0
+    residual = problem.points - project(camera, problem.landmarks(solution.alpha))
+    if len(residual) < len(observation.points):
+        seen, residual = residual, np.full(observation.points.shape, np.nan)
+        residual[observation.visible] = seen
     return Fit(
         model=task.model,
         observation=observation,
         options=task.options,
         camera=camera,
         alpha=solution.alpha,
-        rotation=axis_angle(camera.R @ R0),
-        translation=np.array([*camera.t, 1 / camera.kappa]) if perspective else camera.t,
-        focal=camera.focal,
-        scale=None if perspective else camera.s,
         residual=residual,
         cost=solution.cost,
         prior_weight=float(problem.prior_weight),
