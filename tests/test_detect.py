@@ -6,6 +6,7 @@ import hashlib
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -35,7 +36,7 @@ MIRRORED = [
 ]  # fmt: skip
 
 
-def rendering(face: fa.Subject, width: int = 480, **pose: float):
+def rendering(face: fa.Subject, width: int = 480, **pose: Any):
     """A photograph of `face` and its true points (68, 2)."""
     pose = {"distance": 0.8} | pose
     seen = fa.observe(face, **pose)
