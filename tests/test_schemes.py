@@ -253,6 +253,13 @@ def test_schemes_survive_a_file(tmp_path, name, request):
         )
 
 
+def test_a_files_own_mediapipe_stays(tmp_path, embedded):
+    own = replace(embedded.scheme("mediapipe"), vertices=np.arange(50))
+    schemes = {"ibug68": embedded.scheme("ibug68"), "mediapipe": own}
+    fio.save_model(replace(embedded.truncate(2), subjects=(), schemes=schemes), tmp_path / "a.npz")
+    assert fio.load_model(tmp_path / "a.npz").scheme("mediapipe").rows() == own.rows()
+
+
 def test_the_documents_counts_and_lines_are_so(embedded, ict):
     text = (Path(__file__).resolve().parents[1] / "docs" / "landmarks.md").read_text("utf-8")
     rows = re.findall(r"^\| `(\w+)` \| *(\d*) *\| *(\d*) *\|", text, re.MULTILINE)

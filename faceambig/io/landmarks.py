@@ -137,7 +137,7 @@ def _size(
     file: Path, given: tuple[int, int] | None, found: Points
 ) -> tuple[tuple[int, int] | None, str]:
     """The picture's size and where it is from; AssetError where the file says that it is another picture's."""
-    beside = None if given is not None else picture_beside(file)
+    beside = picture_beside(file)
     if given is not None:
         size, origin = (int(given[0]), int(given[1])), "given"
     elif beside is not None:
