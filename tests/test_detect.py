@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import hashlib
+import json
+import re
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 import pytest
+from PIL import Image
 
 import faceambig as fa
 from faceambig.compose import photo
 from faceambig.errors import AssetError
-from faceambig.io import nets
+from faceambig.io import detect, nets
 from faceambig.io.detect import (
     JAW,
     MESH_OF_IBUG,
@@ -23,9 +27,11 @@ from faceambig.io.detect import (
     Detection,
     detect_landmarks,
     draw_detection,
+    write_detection,
 )
 from faceambig.observation import portrait_camera
 from faceambig.render.painter import paint_photo
+from faceambig_app.cli import main
 
 ROOT = Path(__file__).resolve().parents[1]
 PHOTOS = ROOT.parent / "shared" / "data" / "photos"
@@ -95,10 +101,13 @@ def test_points_of_the_embedded_people_are_found(embedded):
     missed = []
     for number, yaw in ((1, -30), (4, -15), (7, 0), (9, 20), (10, 30)):
         picture, truth = rendering(embedded.subject(number), yaw_deg=yaw, pitch_deg=yaw / 4)
-        missed.append(off(detect_landmarks(picture).points, truth))
-    # 3.0 is the mean and 4.2 the worst of 30 others in benchmarks/detect.py; a point of a wrong place is off by 10
-    assert np.mean(missed) < 4.2
-    assert max(missed) < 6.5
+        missed.append(errors(detect_landmarks(picture).points, truth)[17:])
+    # 3.0 is the mean and 4.2 the worst of 30 others in benchmarks/detect.py
+    assert np.mean(missed) < 3.9
+    assert np.mean(missed, axis=1).max() < 6.5
+    assert (
+        np.mean(missed, axis=0).max() < 8
+    )  # of one point; 5.6 measured, its neighbours on the mesh are further
 
 
 def test_bare_heads_of_ict_are_found_but_for_the_brows_they_lack(ict):
@@ -141,20 +150,22 @@ def test_a_turned_picture_has_the_same_points(portrait, quarters):
 
 def test_a_small_face_is_found_in_a_large_picture(portrait):
     picture, truth, _ = portrait
-    wide = np.full((900, 1600, 3), 120, np.uint8)
-    small = cv2.resize(picture, (240, 240), interpolation=cv2.INTER_AREA)
-    wide[600:840, 1200:1440] = small
-    points = detect_landmarks(wide).points
-    assert off((points - (1200, 600)) * 2, truth) < 4.8
+    for side in (240, 120):  # the face is a tenth, a twentieth of the picture's width
+        wide = np.full((900, 1600, 3), 120, np.uint8)
+        small = cv2.resize(picture, (side, side), interpolation=cv2.INTER_AREA)
+        wide[600 : 600 + side, 1200 : 1200 + side] = small
+        found = detect_landmarks(wide)
+        assert off((found.points - (1200, 600)) * (480 / side), truth) < 5.5
+        assert found.n_faces == 1  # though several windows see it
 
 
-def test_a_face_larger_than_the_picture_is_found(portrait):
+@pytest.mark.parametrize("more", [0, 35])
+def test_a_face_larger_than_the_picture_is_found(portrait, more):
     picture, truth, _ = portrait
-    low, high = np.floor(truth.min(axis=0)).astype(int), np.ceil(truth.max(axis=0)).astype(int)
+    low = np.floor(truth.min(axis=0)).astype(int) + more
+    high = np.ceil(truth.max(axis=0)).astype(int) - more
     cut = picture[low[1] : high[1], low[0] : high[0]]
-    assert (
-        off(detect_landmarks(cut).points + low, truth) < 5.5
-    )  # the chin and the temples are cut off
+    assert off(detect_landmarks(cut).points + low, truth) < 6.5  # chin and temples are cut off
 
 
 def test_scale_and_place_of_the_picture_do_not_move_the_points(portrait):
@@ -200,6 +211,17 @@ def test_a_picture_without_a_face_is_refused(picture):
     ) as error:
         detect_landmarks(picture, name="a.png")
     assert "\n" not in str(error.value)
+
+
+def test_both_networks_have_to_agree_where_eyes_nose_and_mouth_are(portrait):
+    picture = portrait[0]
+    whole = nets.Frame(np.array([240.0, 240.0]), 480.0, 0.0)
+    seen = nets.candidates(picture, whole, detect.LEAST_SCORE)[0]
+    eyes = np.linalg.norm(seen.keys[0] - seen.keys[1])
+    assert detect._face(picture, seen) is not None
+    moved = seen.keys.copy()
+    moved[2:4] += (0.8 * eyes, 0)  # nose and mouth: a mean of 0.4 over the four
+    assert detect._face(picture, seen._replace(keys=moved)) is None
 
 
 def test_a_head_from_behind_is_no_face(embedded):
@@ -293,7 +315,11 @@ def test_a_frame_cuts_pixels_where_they_are():
     turned = nets.cut(picture, quarter, 32, edge=True).astype(int)
     # Weights of the warp have 5 bits: a right angle is not exact
     assert np.abs(turned - np.rot90(picture[9:41, 14:46])).max() <= 1
-    # Averaged before it is read: blocks of 2 x 2, to the rounding
+    # Averaged before it is read: blocks of 2 x 2, to the rounding; a picture of odd sides is stretched by a little
+    odd = nets.Frame(np.array([40.5, 29.5]), 81.0, 0.0)
+    ramp = np.repeat(np.arange(81, dtype=np.uint8)[None, :, None] * 3, 59, axis=0).repeat(3, axis=2)
+    values = nets.cut(ramp, odd, 27, edge=True)[13, 2:25, 0]
+    assert np.abs(values - (3 * (3 * np.arange(2, 25) + 1.0))).max() <= 1
     coarse = nets.cut(
         picture, straight._replace(side=48.0, centre=np.array([40.0, 24.0])), 24, edge=True
     )
@@ -329,9 +355,159 @@ def test_points_are_drawn_where_they_are_and_the_picture_stays(portrait):
     assert (jaw != picture).any(axis=2)[y, x]
 
 
+def test_a_dot_lies_in_the_middle_of_its_point(portrait):
+    points = np.full((68, 2), np.nan)
+    points[30] = 60.25, 40.75
+    one = replace(portrait[2], points=points, box=(-500.0, -500.0, -10.0, -10.0))
+    drawn = draw_detection(np.zeros((90, 120, 3), np.uint8), one).sum(axis=2).astype(float)
+    y, x = np.mgrid[:90, :120] + 0.5
+    centre = (drawn * x).sum() / drawn.sum(), (drawn * y).sum() / drawn.sum()
+    assert np.abs(np.array(centre) - points[30]).max() < 0.1
+
+
 def test_a_detection_cannot_be_written_to(portrait):
     found = portrait[2]
     assert isinstance(found, Detection)
     for array in (found.points, found.mesh):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 0
+
+
+# ---- the command ----
+
+
+@pytest.fixture(scope="module")
+def photo_file(portrait, tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("photo") / "photo.png"
+    cv2.imwrite(str(path), portrait[0][:, :, ::-1])
+    return path
+
+
+def printed(capsys, *arguments: object) -> tuple[int, str, str]:
+    status = main([str(argument) for argument in arguments])
+    captured = capsys.readouterr()
+    return status, captured.out, captured.err
+
+
+def test_command_writes_points_that_fit_reads_and_a_picture_of_them(
+    capsys, photo_file, tmp_path, portrait
+):
+    out, overlay = tmp_path / "points.json", tmp_path / "overlay.png"
+    command = ("landmarks", photo_file, "--out", out, "--overlay", overlay)
+    status, said, _ = printed(capsys, *command)
+    assert status == 0
+    assert "score 0.9" in said
+    assert "51 points; the jaw (1 to 17) is left out" in said
+    assert f"written: {out}, {overlay}" in said
+    assert {path.name for path in tmp_path.iterdir()} == {"points.json", "overlay.png"}
+    picture, _, found = portrait
+    read = fa.load_landmarks(out)
+    assert read.scheme == "ibug68"
+    assert read.image_size == (480, 480)
+    assert np.array_equal(read.points, found.points, equal_nan=True)
+    drawn = cv2.imread(str(overlay), cv2.IMREAD_COLOR_RGB)
+    assert np.array_equal(np.asarray(drawn), draw_detection(picture, found))
+    status, said, _ = printed(capsys, "fit", out, "--distance", 0.8, "--json")
+    assert status == 0
+    fitted = json.loads(said)
+    assert fitted["points_used"] == 51
+    assert fitted["d_l_percent"] < 3.5
+
+
+def test_command_says_what_a_program_needs(capsys, photo_file, portrait):
+    status, said, _ = printed(capsys, "landmarks", photo_file, "--jaw", "--json")
+    assert status == 0
+    record = json.loads(said)
+    assert record["picture"] == "photo.png"
+    assert record["image_size"] == [480, 480]
+    assert record["n_faces"] == 1
+    assert record["files"] == []
+    assert None not in record["points"]
+    assert np.allclose(record["points"][17:], portrait[2].points[17:], rtol=0, atol=1e-9)
+    _, said, _ = printed(capsys, "landmarks", photo_file, "--json")
+    assert json.loads(said)["points"][:17] == [None] * 17
+
+
+def as_16_bits(path: Path, picture) -> None:
+    cv2.imwrite(str(path), cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY).astype(np.uint16) * 257)
+
+
+def with_alpha(path: Path, picture) -> None:
+    alpha = np.full((*picture.shape[:2], 1), 255, np.uint8)
+    alpha[:20] = 0
+    Image.fromarray(np.concatenate([picture, alpha], axis=2)).save(path)
+
+
+def as_cmyk(path: Path, picture) -> None:
+    Image.fromarray(picture).convert("CMYK").save(path, "JPEG", quality=95)
+
+
+@pytest.mark.parametrize(
+    ("write", "name", "note"),
+    [
+        (as_16_bits, "a.png", "16 bits"),
+        (with_alpha, "a.png", "transparen"),
+        (as_cmyk, "a.jpg", "CMYK"),
+    ],
+)
+def test_odd_pictures_are_converted_and_that_is_said(capsys, tmp_path, portrait, write, name, note):
+    picture, truth, _ = portrait
+    write(tmp_path / name, picture)
+    status, said, _ = printed(capsys, "landmarks", tmp_path / name, "--json")
+    assert status == 0
+    record = json.loads(said)
+    assert note in " ".join(record["converted"])
+    points = np.array(record["points"][17:], dtype=np.float64)
+    assert errors(np.concatenate([truth[:17], points]), truth)[17:].mean() < 4.8
+
+
+@pytest.mark.parametrize(
+    ("name", "flags", "words"),
+    [
+        ("missing.jpg", (), r"missing\.jpg"),
+        ("text.jpg", (), r"text\.jpg: not a picture"),
+        ("short.jpg", (), r"short\.jpg: (damaged|not a picture)"),
+        ("one.png", (), r"one\.png: 1 x 1 pixels; at least 32 x 32 show a face"),
+        ("sky.png", (), r"sky\.png: no face found"),
+        ("photo.png", ("--out", "points.txt"), r"--out: .* does not end in \.json"),
+        ("photo.png", ("--overlay", "o.jpg"), r"--overlay: .* does not end in \.png"),
+        ("photo.png", ("--overlay", "photo.png"), r"--overlay: .* is the photograph itself"),
+        ("photo.png", ("--out", "no/points.json"), r"--out: there is no folder"),
+        ("photo.png", ("--out", "folder.json"), r"--out: .* is a folder, not a file"),
+    ],
+)
+def test_command_refuses_in_one_line_and_writes_nothing(
+    capsys, monkeypatch, tmp_path, portrait, name, flags, words
+):
+    monkeypatch.chdir(tmp_path)
+    packed = cv2.imencode(".jpg", portrait[0])[1].tobytes()
+    Path("short.jpg").write_bytes(packed[: len(packed) // 3])
+    Path("text.jpg").write_text("no picture", encoding="utf-8")
+    Path("photo.png").write_bytes(cv2.imencode(".png", portrait[0])[1].tobytes())
+    Path("one.png").write_bytes(cv2.imencode(".png", np.zeros((1, 1, 3), np.uint8))[1].tobytes())
+    Path("sky.png").write_bytes(cv2.imencode(".png", clouds(15))[1].tobytes())
+    Path("folder.json").mkdir()
+    before = {path: path.stat().st_size for path in tmp_path.rglob("*")}
+    flags = flags or ("--out", "points.json", "--overlay", "overlay.png")
+    status, out, err = printed(capsys, "landmarks", name, *flags)
+    assert status == 2
+    assert out == ""
+    assert err.count("\n") == 1
+    assert re.search(f"^faceambig landmarks: .*{words}", err)
+    assert {path: path.stat().st_size for path in tmp_path.rglob("*")} == before
+
+
+def test_what_cannot_be_written_leaves_the_old_files(monkeypatch, tmp_path, portrait):
+    picture, _, found = portrait
+    out, overlay = tmp_path / "points.json", tmp_path / "overlay.png"
+    out.write_text("old", encoding="utf-8")
+    overlay.write_text("old", encoding="utf-8")
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(detect, "save_landmarks", full)
+    with pytest.raises(ValueError, match=r"cannot be written \(No space left on device\)$"):
+        write_detection(found, out, picture, overlay)
+    assert out.read_text(encoding="utf-8") == overlay.read_text(encoding="utf-8") == "old"
+    assert len(list(tmp_path.iterdir())) == 2

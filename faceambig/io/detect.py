@@ -11,7 +11,9 @@ Accuracy, speed, and what else looks like a face: benchmarks/detect.py.
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterator
+from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -19,6 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array, read_only, shown
+from .files import replacing
+from .landmarks import LandmarkFile, save_landmarks
 from .nets import DETECTOR_PX, SAME_FACE, Candidate, Frame, candidates, face_mesh, opencv, shared
 
 ROOM = 1.5  # side of the square the mesh network sees over that of the face in it
@@ -254,3 +258,26 @@ def draw_detection(picture: NDArray[np.uint8], detection: Detection) -> NDArray[
         cv2.circle(drawn, (x, y), round(16 * 1.7 * unit), RIM, cv2.FILLED, cv2.LINE_AA, 4)
         cv2.circle(drawn, (x, y), round(16 * 1.2 * unit), DOTS, cv2.FILLED, cv2.LINE_AA, 4)
     return drawn
+
+
+def write_detection(
+    detection: Detection,
+    points: str | os.PathLike[str] | None = None,
+    drawn: NDArray[np.uint8] | None = None,
+    overlay: str | os.PathLike[str] | None = None,
+) -> None:
+    """Write the file that `load_landmarks` reads to `points`, and the picture `drawn` as PNG to `overlay`.
+
+    Either may be left out. Both are written whole before either appears; ValueError if they cannot be.
+    """
+    file = LandmarkFile(detection.points, detection.scheme, detection.image_size)
+    try:
+        with ExitStack() as stack:
+            if overlay is not None and drawn is not None:
+                packed = opencv().imencode(".png", np.ascontiguousarray(drawn[:, :, ::-1]))[1]
+                stack.enter_context(replacing(overlay)).write_bytes(packed.tobytes())
+            if points is not None:
+                save_landmarks(file, points)
+    except OSError as error:
+        named = " and ".join(str(path) for path in (points, overlay) if path is not None)
+        raise ValueError(f"{named}: cannot be written ({error.strerror or error})") from error

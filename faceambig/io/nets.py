@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Array
 from ..errors import AssetError
-from .npz import asset_path
+from .files import asset_path
 
 DETECTOR, MESH = "face_detection_short_range.tflite", "face_landmark.tflite"
 SHA256 = {

@@ -22,7 +22,7 @@ from faceambig_app.state import DEFAULT, FIELDS, ViewState, changed
 from scenes import need_renderer
 
 Capture = pytest.CaptureFixture[str]
-COMMANDS = ("serve", "snapshot", "fit", "sweep", "models")
+COMMANDS = ("serve", "snapshot", "fit", "sweep", "landmarks", "models")
 
 
 def write_pts(path: Path, points: np.ndarray) -> Path:
