@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, whole
 from ..camera import Camera, Seen, View
 from ..rotation import rotation_matrix
 from .boxqp import Pass, passes
@@ -59,7 +59,7 @@ def solve_batch(
     progress: Callable[[int], object] | None,
 ) -> list[Answer]:
     """As `solve_by` for every start, in order. `progress` hears how many faces are done since it last heard."""
-    if n_jobs == 0:
+    if whole("n_jobs", n_jobs) == 0:
         raise ValueError("n_jobs: 0 is no number of processes; give 1 or more, or -1 for all cores")
     alike: dict[tuple[int, float, bool], list[int]] = defaultdict(list)
     for row, (problem, _, _) in enumerate(starts):
