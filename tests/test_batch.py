@@ -142,7 +142,10 @@ def test_two_processes_give_the_same_fits():
 def test_a_dask_cluster_gives_the_same_fits():
     observations = photographs(batch.CHUNK + 6)
     cluster = dask.distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None
+        n_workers=2,
+        threads_per_worker=1,
+        host="127.0.0.1",
+        dashboard_address=None,  # pyright: ignore[reportArgumentType]
     )
     with (
         cluster,
