@@ -35,9 +35,24 @@ class Pass(NamedTuple):
     factors: dict[bytes, Array]  # of H's free parts, by name: for another g or other bounds
 
 
-Passed = (
-    tuple[Array, np.ndarray, int] | None
-)  # d, wrong (n,), their number; None: not positive definite
+class Passed(NamedTuple):
+    """The answer."""
+
+    d: Array  # (n,)
+    wrong: np.ndarray  # (n,) bool: free and out of the box, or held against the slope
+    n_wrong: int
+    gd: float  # g . d
+    promised: float  # g . d - d . H d / 2, how much lower the quadratic lies at d than at 0
+
+
+class Step(NamedTuple):
+    """Where the quadratic is least in the box."""
+
+    d: Array  # (n,)
+    active: np.ndarray  # (n,) int8: which bounds hold (-1, 0, 1)
+    solved: bool  # exact; else d is clipped to the box, feasible but not optimal
+    gd: float  # g . d
+    promised: float  # g . d - d . H d / 2
 
 
 def box_qp(
@@ -49,8 +64,8 @@ def box_qp(
     max_rounds: int,
     factors: dict[bytes, Array],
     there: bool,
-) -> Generator[Pass, Passed, tuple[Array, np.ndarray, bool]]:
-    """(d, active, solved) as `solve_box_qp`, for whoever answers its passes."""
+) -> Generator[Pass, Passed | None, Step]:
+    """As `solve_box_qp`, for whoever answers its passes, with None where H is not positive definite."""
     n, slack = len(g), 1e-12 * math.sqrt(g @ g) + 1e-300
     fewest, tries = n + 1, BLOCK_TRIES
     d = np.zeros(n)
@@ -58,10 +73,10 @@ def box_qp(
         passed = yield Pass(H, g, low, high, active, there, slack, factors)
         if passed is None:
             raise np.linalg.LinAlgError("H is not positive definite")
-        d, wrong, count = passed
+        d, wrong, count, gd, promised = passed
         there = False
         if count == 0:
-            return d, active, True
+            return Step(d, active, True, gd, promised)
         if count < fewest:
             fewest, tries = count, BLOCK_TRIES
         elif tries > 0:
@@ -73,16 +88,17 @@ def box_qp(
         # Bounds that hold against the slope are given up, variables out of the box held
         beyond = (d > high).astype(np.int8) - (d < low)
         active = np.where(wrong, np.where(active, FREE, beyond), active)
-    return np.clip(d, low, high), active, False
+    d = np.clip(d, low, high)
+    gd = float(g @ d)
+    return Step(d, active, False, gd, gd - 0.5 * float(d @ (H @ d)))
 
 
 def solve_box_qp(
     H: Array, g: Array, low: Array, high: Array, active: np.ndarray, max_rounds: int
-) -> tuple[Array, np.ndarray, bool]:
-    """(d, active, solved): minimiser (n,), which bounds hold (-1, 0, 1), and whether it is exact.
+) -> Step:
+    """The minimiser of the quadratic in the box, searched for within `max_rounds`.
 
-    `active` (n,) int8 is the guess to start from, e.g. the last step's. Not solved within `max_rounds`: d is clipped to
-    the box, feasible but not optimal. LinAlgError if H is not positive definite.
+    `active` (n,) int8 is the guess to start from, e.g. the last step's. LinAlgError if H is not positive definite.
     """
     work = box_qp(H, g, low, high, active, max_rounds, {}, False)
     asked = next(work)
@@ -93,7 +109,7 @@ def solve_box_qp(
             return end.value
 
 
-def one_pass(asked: Pass) -> Passed:
+def one_pass(asked: Pass) -> Passed | None:
     """The answer to one pass."""
     H, g, low, high, active, there, slack, factors = asked
     free = active == FREE
@@ -101,23 +117,28 @@ def one_pass(asked: Pass) -> Passed:
     slope = _solve_free(H, g, free, d, there, factors)
     if slope is None:
         return None
-    if slope is g:  # nothing held
-        wrong = (d < low) | (d > high)
+    gd = float(g @ d)
+    if slope is g:  # nothing held, g - H d = 0
+        wrong, promised = (d < low) | (d > high), 0.5 * gd
     else:
         wrong = _wrong(low, high, active, slack, free, d, slope)
-    return d, wrong, int(np.count_nonzero(wrong))
+        promised = 0.5 * (gd + float(slope @ d))
+    return Passed(d, wrong, int(np.count_nonzero(wrong)), gd, promised)
 
 
-def passes(asked: Sequence[Pass]) -> list[Passed]:
+def passes(asked: Sequence[Pass]) -> list[Passed | None]:
     """The answers to many, what is not linear algebra computed together."""
     H, g, *limits, there, slack, factors = zip(*asked, strict=True)
     low, high, active = map(np.stack, limits)
     free = active == FREE
     d = _held(low, high, active, free)
     slopes = list(map(_solve_free, H, g, free, d, there, factors))
-    slope = np.stack([g[0] if each is None else each for each in slopes])
+    slope = np.stack([d[0] if each is None else each for each in slopes])
     wrong = _wrong(low, high, active, np.array(slack)[:, None], free, d, slope)
-    rows = zip(d, wrong, np.count_nonzero(wrong, axis=1).tolist(), strict=True)
+    gd = np.vecdot(np.stack(g), d)
+    promised = 0.5 * (gd + np.where(free.all(axis=1), 0.0, np.vecdot(slope, d)))
+    counts = np.count_nonzero(wrong, axis=1)
+    rows = map(Passed, d, wrong, counts.tolist(), gd.tolist(), promised.tolist())
     return [None if each is None else row for each, row in zip(slopes, rows, strict=True)]
 
 
@@ -138,15 +159,15 @@ def _solve_free(
         if factor is None:
             part = H if everything else H.take(chosen, 0).take(chosen, 1)
             # .T of a C-ordered symmetric matrix is the Fortran order LAPACK wants: no transposed copy
-            factor, info = lapack.dpotrf(part.T, clean=0)
+            factor, info = lapack.dpotrf(part.T, lower=1, clean=0)
             if info != 0:
                 return None
             factors[name] = factor
         if everything:
-            d[:] = lapack.dpotrs(factor, g)[0]
+            d[:] = lapack.dpotrs(factor, g, lower=1)[0]
             return g
         pull = g if there else g - H @ d
-        d[chosen] = lapack.dpotrs(factor, pull[chosen])[0]
+        d[chosen] = lapack.dpotrs(factor, pull[chosen], lower=1)[0]
     return g - H @ d
 
 

@@ -158,15 +158,16 @@ def descent(
         damped = H + np.diag(mu * np.diag(H)) if mu > 0 else H
         rounds = QP_ROUNDS_EARLY[step - 1] if step <= len(QP_ROUNDS_EARLY) else QP_ROUNDS
         try:
-            delta, active, solved = yield from box_qp(
+            delta, active, solved, gd, promised = yield from box_qp(
                 damped, g, lowest - here, highest - here, active, rounds, factors, whole
             )
         except np.linalg.LinAlgError:  # a bad point of the curved valley: damp and try again
             mu, active = max(FIRST_DAMPING, MORE_DAMPING * mu), np.zeros(n, dtype=np.int8)
             keep = whole = False
             continue
-        slope = 2 * float(g @ delta)
-        predicted = slope - float(delta @ (H @ delta))
+        slope, predicted = 2 * gd, 2 * promised
+        if mu > 0:
+            predicted += mu * float(np.diag(H) @ delta**2)  # of the quadratic without damping
         if mu == 0 and solved and predicted <= tolerance * point.cost + rounding:
             if predicted > 0.1 * tolerance * point.cost + rounding:  # the step is known: take it
                 new = yield Trial(point, delta, 1.0)
