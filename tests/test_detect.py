@@ -168,6 +168,34 @@ def test_a_face_larger_than_the_picture_is_found(portrait, more):
     assert off(detect_landmarks(cut).points + low, truth) < 6.5  # chin and temples are cut off
 
 
+def test_a_face_seen_by_two_looks_is_one(portrait):
+    picture = portrait[0]
+    found = [
+        detect._face(picture, detect.candidates(picture, nets.Frame(centre, side, 0.0), 0.5)[0])
+        for centre, side in ((np.array([240.0, 240.0]), 480.0), (np.array([250.0, 230.0]), 520.0))
+    ]
+    seen = [face for face in found if face is not None]
+    assert len(seen) == 2
+    best = max(seen, key=lambda face: face.candidate.score)
+    far = best._replace(candidate=best.candidate._replace(corners=best.candidate.corners + 400.0))
+    kept = detect._apart([*seen, far])
+    assert [face is best for face in kept] == [True, False]
+    assert kept[1] is far
+
+
+def test_the_second_look_at_a_face_is_level_and_around_its_points(portrait):
+    mesh = portrait[2].mesh
+    c, s = np.cos(0.6), np.sin(0.6)
+    straight, turned = detect._around(mesh), detect._around(mesh @ np.array([[c, s], [-s, c]]))
+    assert turned.turn - straight.turn == pytest.approx(0.6, abs=1e-12)
+    assert turned.side == pytest.approx(straight.side, rel=1e-12)
+    inside = mesh @ straight.into(192)[:, :2].T + straight.into(192)[:, 2]
+    assert inside[33, 1] == pytest.approx(inside[263, 1], abs=1e-9)  # outer corners of the eyes
+    low, high = inside.min(axis=0), inside.max(axis=0)
+    assert (high - low).max() == pytest.approx(192 / 1.5)
+    assert np.abs(low + high - 192).max() < 1e-9
+
+
 def test_scale_and_place_of_the_picture_do_not_move_the_points(portrait):
     picture, _, found = portrait
     large = cv2.resize(picture, None, fx=3, fy=3, interpolation=cv2.INTER_LINEAR)
@@ -220,7 +248,7 @@ def test_both_networks_have_to_agree_where_eyes_nose_and_mouth_are(portrait):
     eyes = np.linalg.norm(seen.keys[0] - seen.keys[1])
     assert detect._face(picture, seen) is not None
     moved = seen.keys.copy()
-    moved[2:4] += (0.8 * eyes, 0)  # nose and mouth: a mean of 0.4 over the four
+    moved[2:4] += np.array([0.8 * eyes, 0.0])  # nose and mouth: a mean of 0.4 over the four
     assert detect._face(picture, seen._replace(keys=moved)) is None
 
 
