@@ -5,7 +5,8 @@ outline of the head and, inside it, of the nose or an ear before the cheek. What
 as an edge, but which pixel belongs to which vertex is not known: nearest neighbours are paired, the face is fitted to
 landmarks and pairs together, and both are repeated. The pairs hardly ever come to rest, so the surface decides.
 
-Contours help at the right distance, in the mean; at a wrong one they pull the face further from the truth.
+Contours help at the right distance, in the mean and as far as the model can make the face; at a wrong distance they
+pull it further from the truth (benchmarks/contours.py).
 """
 
 from __future__ import annotations

@@ -83,9 +83,9 @@ def bumpy_model(rings: int = 24, around: int = 36, n_modes: int = 8) -> FaceMode
     )
     bumps = ((0.0, -0.1, 1.0, 0.35), (0.35, 0.3, 0.85, 0.15), (-0.35, 0.3, 0.85, 0.15),
              (1.0, 0.0, 0.0, 0.3), (-1.0, 0.0, 0.0, 0.3))  # fmt: skip
-    swell = 1.0 + sum(
-        height * np.exp(-30.0 * ((ball - np.array(at)) ** 2).sum(axis=1)) for *at, height in bumps
-    )
+    swell = np.ones(len(ball))
+    for *at, height in bumps:
+        swell += height * np.exp(-30.0 * ((ball - np.array(at)) ** 2).sum(axis=1))
     mean = ball * swell[:, None] * (0.075, 0.105, 0.085) - (0.0, 0.0, 0.085)
     rng = np.random.default_rng(3)
     modes = np.zeros((len(mean), 3, n_modes))
@@ -106,7 +106,12 @@ def bumpy_model(rings: int = 24, around: int = 36, n_modes: int = 8) -> FaceMode
     rest = [v for v in rng.choice(front, 30, replace=False).tolist() if v not in four][:16]
     vertices = np.array(four + rest)
     scheme = Scheme(
-        "egg", tuple(str(v) for v in vertices), vertices, ("mid",) * 20, ((0, 1), (2, 3)), "two each"
+        "egg",
+        tuple(str(v) for v in vertices),
+        vertices,
+        ("mid",) * 20,
+        ((0, 1), (2, 3)),
+        "two each",
     )
     return FaceModel("egg", mean, modes, faces, {"egg": scheme})
 
@@ -114,6 +119,4 @@ def bumpy_model(rings: int = 24, around: int = 36, n_modes: int = 8) -> FaceMode
 def poses(number: int) -> list[tuple[float, float, float]]:
     """Yaw, pitch, roll in degrees: the whole circle of yaw, pitch within 50, any roll."""
     rng = np.random.default_rng(17)
-    return [
-        tuple(rng.uniform((-180, -50, -180), (180, 50, 180)).tolist()) for _ in range(number)
-    ]
+    return [tuple(rng.uniform((-180, -50, -180), (180, 50, 180)).tolist()) for _ in range(number)]

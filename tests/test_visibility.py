@@ -26,7 +26,9 @@ def test_every_vertex_of_a_bumpy_shell_is_as_traced(case):
     model = bumpy_model(rings=14, around=22)
     camera = camera_of(poses(20)[case], KAPPAS[case % 4])
     lead = traced(model.faces, model.mean, camera, np.arange(model.n_vertices))
-    clear = np.abs(lead - MARGIN) > 1e-4  # depth is taken as linear: facets of 2 cm are off by 0.05 mm
+    clear = (
+        np.abs(lead - MARGIN) > 1e-4
+    )  # depth is taken as linear: facets of 2 cm are off by 0.05 mm
     assert clear.mean() > 0.97
     found = visible_vertices(model.faces, model.mean, camera)
     np.testing.assert_array_equal(found[clear], lead[clear] <= MARGIN)
@@ -64,7 +66,9 @@ def test_asked_vertices_are_answered_in_their_order():
 
 
 def test_two_millimetres_behind_a_triangle_are_forgiven_and_no_more():
-    sheet = np.array([[-0.1, -0.1, 0], [0.1, -0.1, 0], [0, 0.1, 0], [0, 0, -0.0019], [0, 0, -0.0021]])
+    sheet = np.array(
+        [[-0.1, -0.1, 0], [0.1, -0.1, 0], [0, 0.1, 0], [0, 0, -0.0019], [0, 0, -0.0021]]
+    )
     faces = np.array([[0, 1, 2]], dtype=np.uint32)
     for kappa in (0.0, 2.0):
         camera = Camera(rotation_from_angles(0, 0, 0), np.zeros(2), 1000.0, kappa)
