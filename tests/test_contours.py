@@ -228,33 +228,42 @@ def test_contours_of_a_face_of_the_model_bring_it_nearer_to_the_truth():
 
 
 def test_a_cycle_is_seen_and_its_member_of_least_cost_kept():
-    for seed in range(40):
+    cycles = 0
+    for seed in (
+        17,
+        2,
+        25,
+        38,
+        24,
+        54,
+    ):  # more than are needed: another BLAS may end some otherwise
         observation, edges = egg_photograph(seed, yaw=15.0)
         # a reach of few pixels at a wrong distance lets pairs come and go
         options: dict[str, Any] = {"distance": 1.5, "max_distance_px": 4.0, "prior_weight": 0.01}
         found = fa.contour_fit(EGG, observation, edges, **options)
-        if found.status == "cycle":
-            break
-    else:
-        pytest.fail("no case ran into a cycle")
-    # Stopped after each iteration; the pairs that return are those of the next one
-    each = [
-        fa.contour_fit(EGG, observation, edges, **options, max_iterations=k)
-        for k in range(1, found.iterations + 1)
-    ]
-    assert all(one.status == "iteration limit reached" for one in each)
-    tree = cKDTree(edges - observation.centre)
-    last = each[-1].fit
-    vertices, rows = match(EGG, last.vertices(), last.camera, tree, 4.0)
-    same = [
-        k
-        for k, one in enumerate(each)
-        if np.array_equal(one.pairs.vertices, vertices)
-        and np.array_equal(one.pairs.points, edges[rows])
-    ]
-    assert len(same) == 1
-    assert same[0] < len(each) - 1
-    assert found.cost == min(one.cost for one in each[same[0] :])
+        if found.status != "cycle":
+            continue
+        cycles += 1
+        # Stopped after each iteration; the pairs that return are those of the next one
+        each = [
+            fa.contour_fit(EGG, observation, edges, **options, max_iterations=k)
+            for k in range(1, found.iterations + 1)
+        ]
+        assert all(one.status == "iteration limit reached" for one in each)
+        last, tree = each[-1].fit, cKDTree(edges - observation.centre)
+        vertices, rows = match(EGG, last.vertices(), last.camera, tree, 4.0)
+        same = [
+            k
+            for k, one in enumerate(each)
+            if np.array_equal(one.pairs.vertices, vertices)
+            and np.array_equal(one.pairs.points, edges[rows])
+        ]
+        assert len(same) == 1
+        assert same[0] < len(each) - 1
+        assert found.cost == min(one.cost for one in each[same[0] :])
+        if cycles == 3:
+            return
+    assert cycles > 0
 
 
 @pytest.mark.parametrize("edges", [np.zeros((0, 2)), np.full((10, 2), -4000.0)])
