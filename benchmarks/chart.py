@@ -55,13 +55,14 @@ def plot(
         canvas.line((float(x), frame.top), (float(x), bottom), LINE)
         canvas.text(float(x), bottom + 18, f"{10**power:,}", 12.5, DIM, anchor="middle")
     canvas.text(frame.left + frame.width / 2, bottom + 40, axis, 12.5, DIM, anchor="middle")
-    ends = [float(frame.at(line.x[-1], line.y[-1])[1]) for line in lines]
-    for line, y in zip(lines, apart(ends, 18.0), strict=True):
+    ends = [frame.at(line.x[-1], line.y[-1]) for line in lines]
+    beside = max(right, *(float(x) for x, _ in ends)) + 12
+    for line, y in zip(lines, apart([float(y) for _, y in ends], 18.0), strict=True):
         xs, ys = frame.at(line.x, line.y)
         canvas.curve(xs, ys, line.colour, 2.2)
         for point in zip(xs.tolist(), ys.tolist(), strict=True):
             canvas.circle(point, 3.2, line.colour)
-        canvas.text(right + 12, y + 4.5, line.words, 12.5, line.colour, 600)
+        canvas.text(beside, y + 4.5, line.words, 12.5, line.colour, 600)
 
 
 def apart(places: Sequence[float], gap: float) -> list[float]:

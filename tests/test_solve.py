@@ -10,8 +10,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import faceambig as fa
-from faceambig.camera import jacobian
-from faceambig.fitting.solve import Problem, evaluate, gradient, normal_equations, solve
+from faceambig.camera import jacobian, project
+from faceambig.fitting.solve import (
+    Problem,
+    Solution,
+    evaluate,
+    gradient,
+    kkt_error,
+    normal_equations,
+    solve,
+)
 from faceambig.fitting.start import start_pose
 from faceambig.fitting.task import prepare
 from strategies import cameras, face_of, tiny_model
@@ -69,3 +77,29 @@ def test_a_start_on_the_box_that_is_right_costs_no_search():
     again = solve(problem, found.camera, found.alpha, tolerance=1e-8)
     assert again.steps == 1
     assert again.status == "converged"
+
+
+@pytest.mark.parametrize("camera", ["perspective", "orthographic"])
+@pytest.mark.parametrize(("points", "modes"), [(6, 1), (6, 100), (68, 1), (68, 100), (14159, 100)])
+def test_six_points_or_all_vertices_one_mode_or_all(embedded, camera, points, modes):
+    rng = np.random.default_rng(points + modes)
+    alpha = np.zeros(100)
+    alpha[:modes] = rng.uniform(-1.5, 1.5, modes)
+    face = face_of(embedded, alpha)
+    where = {6: embedded.scheme("ibug68").vertices[[8, 30, 36, 45, 48, 54]]}.get(
+        points, embedded.scheme("ibug68").vertices if points == 68 else np.arange(points)
+    )
+    seen = fa.observe(face, distance=0.6 if camera == "perspective" else None, yaw_deg=20)
+    view = fa.fit(embedded, seen, distance=0.6 if camera == "perspective" else None, camera=camera)
+    x = project(view.camera, face.vertices[where]) + rng.normal(scale=0.2, size=(len(where), 2))
+    observation = fa.Observation(x, where, principal_point=(0.0, 0.0))
+    fit = fa.fit(
+        embedded, observation, camera=camera, distance=0.6 if camera == "perspective" else None,
+        modes=modes, box=3.0, prior_weight=0.04,
+    )  # fmt: skip
+    assert fit.converged
+    task = prepare(embedded, observation, fit.options)
+    found = Solution(fit.alpha, fit.camera, fit.cost, fit.steps, fit.status)
+    assert kkt_error(task.problem, found) < 1e-4  # scaled gradient; cost is its square
+    if points == 14159:
+        assert np.abs(fit.alpha - alpha).max() < 0.3  # noise of 0.2 px over 28,318 coordinates

@@ -95,7 +95,7 @@ def fit_batch(
     n_jobs: int = 1,
     progress: Callable[[int], object] | None = None,
 ) -> tuple[Fit | Failure, ...]:
-    """The fits of many observations, in order: those of `fit`, one by one, in half the time.
+    """The fits of many observations, in order: those of `fit`, one by one, in two thirds of the time.
 
     A face that cannot be fitted, points from behind or a scheme that the model lacks, has a `Failure` in its row and
     stops nothing; wrong options are a ValueError, as in `fit`.
