@@ -11,6 +11,7 @@ After A. Bas and W. A. P. Smith, "What does 2D geometric information really tell
 
 from __future__ import annotations
 
+from .contours import ContourFit, ContourStatus, contour_fit
 from .errors import AssetError
 from .fitting import Failure, Fit, FitOptions, Status, fit, fit_batch
 from .flex import FlexibilityModes, flexibility_modes
@@ -21,6 +22,8 @@ from .sweep import Interval, Sweep, sweep_distance
 
 __all__ = [
     "AssetError",
+    "ContourFit",
+    "ContourStatus",
     "FaceModel",
     "Failure",
     "Fit",
@@ -32,6 +35,7 @@ __all__ = [
     "Status",
     "Subject",
     "Sweep",
+    "contour_fit",
     "fit",
     "fit_batch",
     "flexibility_modes",

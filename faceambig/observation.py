@@ -11,6 +11,7 @@ from .arrays import Array, IntArray, checked, number, read_only, shown, whole
 from .camera import Camera, depths, project
 from .model import FaceModel, Scheme, Subject
 from .rotation import rotation_from_angles
+from .visibility import visible_vertices
 
 MIN_POINTS = (
     6  # six pose unknowns at a known distance; fewer leave the pose itself open (MATH.md 8.4)
@@ -28,6 +29,7 @@ DISTANCES = (
     5.0,
 )  # metres, of the camera that took the photograph; nearer, the nose leaves the lens's view
 LARGEST_EYES_PX = 1e6
+DENSE = ("all", "visible")  # `scheme` of observe: vertices of the surface instead of landmarks
 EYES_PX = (
     100.0  # synthetic photographs: frontal distance of the eye centres in a picture of 500 x 500
 )
@@ -192,10 +194,7 @@ def portrait_camera(
     frontal = Camera(rotation_from_angles(0, 0, 0), np.zeros(2), 1.0, kappa)
     s = eyes_px / eye_distance(project(frontal, points), face.model.scheme(scheme))
     camera = Camera(rotation_from_angles(yaw_deg, pitch_deg, roll_deg), np.zeros(2), s, kappa)
-    if (depths(camera, points) <= 0).any():
-        raise ValueError(
-            f"distance: at {distance:g} m a point lies behind the camera; take the photo from farther away"
-        )
+    _refuse_behind(camera, points)
     return camera
 
 
@@ -216,6 +215,8 @@ def observe(
     Parameters
     ----------
     distance: metres from the camera to the middle between the eyes of the mean head; None is orthographic.
+    scheme: of the landmarks; or "all" for every vertex of the surface, "visible" for those that nothing hides: dense
+        correspondence, with vertex numbers as the observation's scheme.
     noise_percent: landmark noise, sd per coordinate in percent of the distance of the eye centres in the picture.
     seed: of the noise.
     eyes_px: pixels between the eye centres of the frontal face.
@@ -227,19 +228,40 @@ def observe(
     seed = whole("seed", seed)
     if seed < 0:
         raise ValueError(f"seed: {shown(seed)} is negative")
+    dense = isinstance(face, Subject) and isinstance(scheme, str) and scheme in DENSE
+    if dense and scheme not in face.model.schemes:
+        named = next(
+            iter(face.model.schemes), "ibug68"
+        )  # whose eyes give zoom and noise their unit
+    else:
+        dense, named = False, scheme
     camera = portrait_camera(
         face,
         distance=distance,
-        scheme=scheme,
+        scheme=named,
         yaw_deg=yaw_deg,
         pitch_deg=pitch_deg,
         roll_deg=roll_deg,
         eyes_px=eyes_px,
     )
-    landmarks = face.model.scheme(scheme)
+    landmarks = face.model.scheme(named)
+    vertices = landmarks.vertices
+    if dense and scheme == "all":
+        vertices = np.arange(len(face.vertices))
+        _refuse_behind(camera, face.vertices)
+    elif dense:
+        vertices = visible_vertices(face.model.faces, face.vertices, camera).nonzero()[0]
     side = round(5 * eyes_px)
-    points = project(camera, face.vertices[landmarks.vertices]) + 0.5 * side
+    points = project(camera, face.vertices[vertices]) + 0.5 * side
     if noise_percent > 0:
-        sigma = noise_percent / 100 * eye_distance(points, landmarks)
+        eyes = project(camera, face.vertices[landmarks.vertices])
+        sigma = noise_percent / 100 * eye_distance(eyes, landmarks)
         points = points + np.random.default_rng(seed).normal(scale=sigma, size=points.shape)
-    return Observation(points, scheme, image_size=(side, side))
+    return Observation(points, vertices if dense else scheme, image_size=(side, side))
+
+
+def _refuse_behind(camera: Camera, points: Array) -> None:
+    if (depths(camera, points) <= 0).any():
+        raise ValueError(
+            f"distance: at {camera.distance:g} m a point lies behind the camera; take the photo from farther away"
+        )

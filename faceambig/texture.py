@@ -22,19 +22,12 @@ from .arrays import Array, IntArray, read_only, vertex_normals
 from .camera import Camera, project
 from .fitting import Fit
 from .model import FaceModel
+from .visibility import visible_vertices
 
-FACING = (
-    0.5  # cosine to the ray: turned away by more than 60 degrees a pixel off is soon the background
-)
-BEHIND = 0.002  # metres behind the nearest surface that still count as seen (MATH.md 5)
-CELLS = 3.0  # of the depth buffer to a mean edge of the mesh
-STEPS = 8  # samples along an edge: triangles of up to 8 cells leave no holes
-MOST_CELLS = 2048  # of a side
+FACING = 0.5  # cosine to the ray: turned away by more than 60 degrees, a pixel is soon the ground's
 PAIRED = 0.004  # metres between a vertex and the mirror image of its partner, at most
-SEAM, FINEST = (
-    0.03,
-    0.003,
-)  # metres over which the light of a seam fades out, and over which it is averaged
+SEAM = 0.03  # metres over which the light of a seam fades out
+FINEST = 0.003  # metres over which it is averaged
 SKIN = 64.0  # brightness from which on a colour takes all of that light: black hair stays black
 NEIGHBOURS = 8  # vertices whose colours a filled one blends
 
@@ -86,7 +79,7 @@ def sample_texture(fit: Fit, rgb: NDArray[np.uint8]) -> Texture:
     at = project(fit.camera, vertices) + fit.observation.centre
     inside = ((at >= 0) & (at <= (rgb.shape[1], rgb.shape[0]))).all(axis=1)
     seen = inside & facing(fit.camera, vertices, fit.model.faces)
-    seen &= visible(fit.camera, vertices, fit.model.faces)
+    seen &= visible_vertices(fit.model.faces, vertices, fit.camera)
     if not seen.any():
         raise ValueError(
             "rgb: the fitted face lies outside the picture; are the points of this picture?"
@@ -175,30 +168,3 @@ def facing(camera: Camera, vertices: Array, faces: NDArray[np.integer]) -> NDArr
     ray = np.column_stack([camera.kappa * (q[:, :2] + camera.t), 1 + camera.kappa * q[:, 2]])
     normals = vertex_normals(vertices, faces) @ camera.R.T
     return -np.einsum("nk,nk->n", normals, ray) >= FACING * np.linalg.norm(ray, axis=1)
-
-
-def visible(camera: Camera, vertices: Array, faces: NDArray[np.integer]) -> NDArray[np.bool_]:
-    """(N,) whether no other part of the surface (N, 3) lies before a vertex: a depth buffer of the mesh itself.
-
-    A vertex is seen if it is at most BEHIND farther than the farthest of the nine cells about it.
-    """
-    depth = vertices @ camera.R[2]  # along one ray more q_z is farther, under both cameras
-    at = project(camera, vertices)
-    edges = at[faces] - at[np.roll(faces, 1, axis=1)]
-    cell = float(np.sqrt((edges**2).sum(axis=-1)).mean()) / CELLS
-    low = at.min(axis=0)
-    cell = max(cell, float(np.ptp(at, axis=0).max()) / MOST_CELLS, 1e-9)
-    size = np.floor((at.max(axis=0) - low) / cell).astype(np.intp) + 3  # a border of one cell
-    # Corners of the samples: barycentric weights on a grid
-    i, j = np.mgrid[0 : STEPS + 1, 0 : STEPS + 1]
-    within = i + j <= STEPS
-    weights = np.stack([i, j, STEPS - i - j], axis=-1)[within] / STEPS  # (P, 3)
-    buffer = np.full(size[0] * size[1], np.inf)
-    for weight in weights:
-        place = ((weight @ at[faces] - low) / cell).astype(np.intp) + 1
-        np.minimum.at(buffer, place[:, 0] * size[1] + place[:, 1], depth[faces] @ weight)
-    grid = buffer.reshape(size)
-    grid[np.isinf(grid)] = -np.inf  # nothing there: never the farthest
-    column, row = (((at - low) / cell).astype(np.intp) + 1).T
-    farthest = np.max([grid[column + a, row + b] for a in (-1, 0, 1) for b in (-1, 0, 1)], axis=0)
-    return depth <= farthest + BEHIND

@@ -100,3 +100,35 @@ def trf(problem: Problem, start: Solution, tolerance: float = 1e-15) -> float:
         max_nfev=400,
     )
     return float(2 * found.cost)
+
+
+def traced(
+    faces: np.ndarray, vertices: np.ndarray, camera: Camera, asked: np.ndarray
+) -> np.ndarray:
+    """(n,) metres of depth by which the surface lies before each asked vertex; 0 where nothing does.
+
+    A ray in space from the vertex to the camera, through every triangle (Moeller and Trumbore). Those that hold the
+    vertex are left out: their lead is 0, or rounding.
+    """
+    q = vertices @ camera.R.T
+    a, b, c = (q[faces[:, k]] for k in range(3))
+    one, two = b - a, c - a
+    lead = np.zeros(len(asked))
+    for i, vertex in enumerate(asked):
+        origin = q[vertex]
+        way = np.array([0.0, 0.0, -1.0])
+        if camera.kappa > 0:
+            way = np.array([-camera.t[0], -camera.t[1], -1 / camera.kappa]) - origin
+        p = np.cross(way, two)
+        det = np.einsum("ij,ij->i", one, p)
+        usable = (np.abs(det) > 0) & (faces != vertex).all(axis=1)
+        inverse = 1 / np.where(usable, det, 1.0)
+        u = np.einsum("ij,ij->i", origin - a, p) * inverse
+        r = np.cross(origin - a, one)
+        v = r @ way * inverse
+        along = np.einsum("ij,ij->i", two, r) * inverse
+        hit = usable & (u >= 0) & (v >= 0) & (u + v <= 1) & (along > 0)
+        if camera.kappa > 0:
+            hit &= along < 1
+        lead[i] = (-way[2] * along[hit]).max(initial=0.0)
+    return lead

@@ -70,3 +70,53 @@ def tiny_model(n_vertices: int = 30, n_modes: int = 5, seed: int = 0) -> FaceMod
 def face_of(model: FaceModel, alpha: np.ndarray, name: str = "drawn") -> Subject:
     """A subject made of the model's own modes."""
     return Subject(name, "drawn from the model", model.vertices(alpha), None, model)
+
+
+def bumpy_model(rings: int = 24, around: int = 36, n_modes: int = 8) -> FaceModel:
+    """An egg of head size with a nose, brows and ears, open at the back; smooth modes, 20 landmarks "egg" in front."""
+    polar = np.linspace(0.0, 2.4, rings + 1)[1:]  # from the front; 2.4 rad: the back is open
+    turn = np.linspace(0.0, 2 * np.pi, around, endpoint=False)
+    grid = np.stack(np.meshgrid(polar, turn, indexing="ij"), axis=-1).reshape(-1, 2)
+    polar, turn = np.concatenate([[[0.0, 0.0]], grid]).T
+    ball = np.stack(
+        [np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), np.cos(polar)], axis=1
+    )
+    bumps = ((0.0, -0.1, 1.0, 0.35), (0.35, 0.3, 0.85, 0.15), (-0.35, 0.3, 0.85, 0.15),
+             (1.0, 0.0, 0.0, 0.3), (-1.0, 0.0, 0.0, 0.3))  # fmt: skip
+    swell = np.ones(len(ball))
+    for *at, height in bumps:
+        swell += height * np.exp(-30.0 * ((ball - np.array(at)) ** 2).sum(axis=1))
+    mean = ball * swell[:, None] * (0.075, 0.105, 0.085) - (0.0, 0.0, 0.085)
+    rng = np.random.default_rng(3)
+    modes = np.zeros((len(mean), 3, n_modes))
+    for j in range(n_modes):  # waves along the sphere, half as strong each third one
+        wave = np.cos(3.0 * ball @ rng.normal(size=3) + rng.uniform(0, 6))
+        modes[:, :, j] = 0.004 * 0.5 ** (j / 3) * wave[:, None] * rng.normal(size=3)
+    i, k = np.meshgrid(np.arange(rings - 1), np.arange(around), indexing="ij")
+    here, beside = 1 + i * around + k, 1 + i * around + (k + 1) % around
+    tip = np.arange(around)
+    faces = np.concatenate([
+        np.stack([np.zeros_like(tip), 1 + tip, 1 + (tip + 1) % around], axis=1),
+        np.stack([here, here + around, beside], axis=-1).reshape(-1, 3),
+        np.stack([beside, here + around, beside + around], axis=-1).reshape(-1, 3),
+    ]).astype(np.uint32)  # fmt: skip
+    front = np.flatnonzero(polar < 0.9)
+    four = [int(np.argmin(np.linalg.norm(ball - np.array([x, 0.3, 0.9]), axis=1)))
+            for x in (-0.45, -0.2, 0.2, 0.45)]  # fmt: skip
+    rest = [v for v in rng.choice(front, 30, replace=False).tolist() if v not in four][:16]
+    vertices = np.array(four + rest)
+    scheme = Scheme(
+        "egg",
+        tuple(str(v) for v in vertices),
+        vertices,
+        ("mid",) * 20,
+        ((0, 1), (2, 3)),
+        "two each",
+    )
+    return FaceModel("egg", mean, modes, faces, {"egg": scheme})
+
+
+def poses(number: int) -> list[tuple[float, float, float]]:
+    """Yaw, pitch, roll in degrees: the whole circle of yaw, pitch within 50, any roll."""
+    rng = np.random.default_rng(17)
+    return [tuple(rng.uniform((-180, -50, -180), (180, 50, 180)).tolist()) for _ in range(number)]

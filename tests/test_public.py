@@ -15,11 +15,13 @@ import faceambig as fa
 ROOT = Path(__file__).parent.parent
 # Names users have written into their programs: more may come, none of these may go or change
 KEPT = {
-    "AssetError", "FaceModel", "Fit", "FitOptions", "FlexibilityModes", "Interval", "Observation", "Scheme", "Status",
-    "Subject", "Sweep", "fit", "flexibility_modes", "load_landmarks", "load_model", "observe", "sweep_distance",
+    "AssetError", "ContourFit", "ContourStatus", "FaceModel", "Fit", "FitOptions", "FlexibilityModes", "Interval",
+    "Observation", "Scheme", "Status", "Subject", "Sweep", "contour_fit", "fit", "flexibility_modes", "load_landmarks",
+    "load_model", "observe", "sweep_distance",
 }  # fmt: skip
 MEMBERS = {
     fa.FaceModel: {"faces", "mean", "n_modes", "n_vertices", "scheme", "subject", "truncate", "vertices"},
+    fa.ContourFit: {"fit", "iterations", "movement_mm", "pairs", "status"},
     fa.Fit: {
         "alpha", "converged", "cost", "d_l_percent", "distance", "focal", "projected", "rotation", "scale", "status",
         "translation", "vertices",
@@ -36,6 +38,16 @@ SIGNATURES = {
     fa.load_model: (["path"], {"part": "face", "origin": "eyes"}),
     fa.observe: (["face"], {"yaw_deg": 0.0, "noise_percent": 0.0, "seed": 0, "scheme": "ibug68"}),
     fa.fit: (["model", "observation"], {"camera": "perspective", "distance": None, **OPTIONS}),
+    fa.contour_fit: (
+        ["model", "observation", "edges"],
+        {
+            "camera": "perspective",
+            "distance": None,
+            "max_distance_px": None,
+            "pair_weight": 1.0,
+            **OPTIONS,
+        },
+    ),
     fa.sweep_distance: (["model", "observation", "distances"], OPTIONS),
     fa.flexibility_modes: (["model", "fit", "count"], {}),
 }

@@ -138,23 +138,10 @@ def fitted(model: fa.FaceModel, start: Given, *, contours: bool = False, **optio
         return Outcome(fit, fit.converged, None)
     if start.picture is None:
         raise ValueError("contours: the photograph is needed, not only its points")
-    try:
-        from faceambig.contours import (  # pyright: ignore[reportMissingImports]
-            contour_fit,
-        )
+    from faceambig.io.pictures import canny_edges
 
-        from faceambig.io.pictures import (  # pyright: ignore[reportAttributeAccessIssue]
-            canny_edges,
-        )
-    except ImportError as error:
-        raise RuntimeError("--contours: this version knows no contours; leave it out") from error
     edges = canny_edges(start.picture.rgb)
-    if not len(edges):  # a picture of one colour
-        fit = fa.fit(model, start.observation, **options)
-        return Outcome(
-            fit, fit.converged, {"status": "no contour found", "iterations": 0, "pairs": 0}
-        )
-    result = contour_fit(model, start.observation, edges, **options)
+    result = fa.contour_fit(model, start.observation, edges, **options)
     said = {
         "status": str(result.status),
         "iterations": result.iterations,

@@ -22,6 +22,9 @@ FARTHEST = 1e6  # metres; beyond, ask for camera="orthographic"
 FIRST_KAPPA = (
     1.0  # per metre: where a free distance starts; no second basin in kappa was met (MATH.md 3)
 )
+MANY = (
+    1000  # points: dense ones; rows of the model take 20 MB, and in every pose others are visible
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,7 +48,8 @@ def prepare(model: FaceModel, observation: Observation, options: FitOptions) -> 
         raise ValueError(f"observation: {shown(observation)} is not an Observation")
     visible = observation.visible
     vertices = observation.vertices(model)
-    mean, pinv, Q = landmark_rows(model, tuple(vertices[visible].tolist()), options.modes_of(model))
+    rows = landmark_rows if len(vertices) <= MANY else _dense_rows
+    mean, pinv, Q = rows(model, tuple(vertices[visible].tolist()), options.modes_of(model))
     points = observation.points[visible] - observation.centre
     pose = pose_from_points(points, mean, pinv)
     interocular, meaning = _interocular(model, observation, pose)
@@ -81,6 +85,9 @@ def landmark_rows(
         )
     modes = np.ascontiguousarray(modes[:, :, :n_modes])
     return read_only(mean), read_only(centred_pinv(mean)), read_only(modes)
+
+
+_dense_rows = lru_cache(maxsize=2)(landmark_rows.__wrapped__)
 
 
 def start_of(task: Task, kappa: float) -> tuple[Camera, Array]:
