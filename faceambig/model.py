@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
-from .arrays import Array, IntArray, checked, read_only
+from .arrays import Array, IntArray, checked, read_only, shown, whole
 from .errors import listed
 
 
@@ -40,6 +40,10 @@ class Scheme:
 
     def __len__(self) -> int:
         return len(self.points)
+
+    def rows(self) -> list[tuple[str, str, int]]:
+        """Name, side and vertex number of each point."""
+        return list(zip(self.points, self.sides, self.vertices.tolist(), strict=True))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,17 +127,18 @@ class FaceModel:
 
     def scheme(self, name: str) -> Scheme:
         """The named landmark scheme; ValueError lists those the model has."""
-        if name not in self.schemes:
+        if not isinstance(name, str) or name not in self.schemes:
             known = listed(self.schemes) if self.schemes else "none"
-            raise ValueError(f"unknown scheme {name!r}: this model has {known}")
+            raise ValueError(f"unknown scheme {shown(name)}: this model has {known}")
         return self.schemes[name]
 
     def subject(self, number: int) -> Subject:
-        """Out-of-sample subject `number`, counted from 1."""
+        """Out-of-sample subject `number`, counted from 1; ValueError if there is none."""
+        number = whole("subject", number)
         if not self.subjects:
             raise ValueError(f"model {self.name!r} has no subjects")
         if not 1 <= number <= len(self.subjects):
-            raise ValueError(f"unknown subject {number}: 1 to {len(self.subjects)}")
+            raise ValueError(f"unknown subject {shown(number)}: 1 to {len(self.subjects)}")
         return self.subjects[number - 1]
 
     def truncate(self, n_modes: int) -> FaceModel:

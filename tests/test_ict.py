@@ -23,7 +23,7 @@ def made_up() -> tuple[bytes, list[bytes]]:
     """Texts of a mean and two identities: random points, eye corners of an adult, quads and triangles."""
     rng = np.random.default_rng(5)
     mean = rng.normal(size=(N, 3)) * (5.0, 7.0, 4.0)  # centimetres
-    scheme = fio.landmarks.load_scheme(fio.asset_path("schemes/ict_ibug68.csv"), "ibug68")
+    scheme = fio.schemes.load_scheme(fio.asset_path("schemes/ict_ibug68.csv"), "ibug68")
     # points 37 to 48: right eye from the outer corner over the lid, left eye from the inner
     x = np.array([-4.5, -3.7, -2.6, -1.8, -2.6, -3.7, 1.8, 2.6, 3.7, 4.5, 3.7, 2.6])
     mean[scheme.vertices[36:48]] = np.column_stack([x, np.full(12, 3.0), np.full(12, 9.0)])

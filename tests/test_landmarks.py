@@ -1,8 +1,10 @@
-"""Landmark files of pictures (.pts), the size of the picture beside them, and the schemes of models."""
+"""Landmark files: what their points are taken for, which are used, and the picture they belong to."""
 
 from __future__ import annotations
 
+import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -14,8 +16,8 @@ from hypothesis import strategies as st
 import faceambig as fa
 import faceambig.io as fio
 from faceambig.errors import AssetError
-from faceambig.io.landmarks import check_scheme, load_scheme
 from faceambig.io.pictures import picture_beside, picture_size
+from faceambig.io.schemes import ibug68_of_mesh
 
 POINTS = np.round(np.random.default_rng(2).uniform(1, 640, (68, 2)), 6)
 ROWS = [f"{x:.6f} {y:.6f}" for x, y in POINTS]
@@ -89,16 +91,20 @@ def rows_with(number: int, line: str) -> list[str]:
         (pts(tail=""), "faces.pts: ends before }, after 68 points"),
         (pts(ROWS[:40], tail=""), "faces.pts: ends before }, after 40 points"),
         (pts(ROWS[:67]), "faces.pts: n_points says 68, there are 67"),
-        (pts(ROWS[:5], head="version: 1\n{\n"), "faces.pts: 5 points; 68 (iBUG) are accepted"),
-        (pts([], head="version: 1\n{\n"), "faces.pts: 0 points; 68 (iBUG) are accepted"),
+        (
+            pts(ROWS[:5], head="version: 1\n{\n"),
+            "faces.pts: 5 points without names; 68 or 51 (iBUG), 468 or 478 (MediaPipe) are accepted",
+        ),
+        (pts([], head="version: 1\n{\n"), "faces.pts: 0 points without names; 68 or 51 (iBUG)"),
         (pts(tail="\n}\n}\n"), "line 73 of faces.pts: nothing may follow }, found '}'"),
         (
             pts(head="version: 1\nhello\n{\n"),
             "line 2 of faces.pts: expected 'n_points: 68' or {, found 'hello'",
         ),
         (pts(head="version: 1\n"), "line 2 of faces.pts: expected 'n_points: 68' or {"),
-        ("", "faces.pts: not a landmark file; .pts (300-W) is accepted"),
-        ("x,y\n1,2\n", "faces.pts: not a landmark file"),
+        ("", "faces.pts: empty"),
+        (" \n\t\n", "faces.pts: empty"),
+        ("hello\n", "faces.pts: not a landmark file; .pts (300-W), CSV with a header (x,y or"),
         ("version: 1\n{\n" + "1 1\n" * 20_000 + "}\n", "faces.pts: more than 10000 points"),
         (
             "version: 1\n" + " " * (1 << 20),
@@ -158,16 +164,20 @@ def picture(file: Path, width: int = 40, height: int = 30) -> Path:
     "extension", [".jpg", ".jpeg", ".png", ".webp", ".bmp", ".tiff", ".JPG", ".PNG"]
 )
 def test_the_size_is_that_of_the_picture_of_the_same_name(path, extension):
+    path.write_text(pts([f"{x:.6f} {y:.6f}" for x, y in POINTS / 32]))
     picture(path.with_suffix(extension))
     picture(path.with_name(f"other{extension}"), 7, 7)
-    file = fio.load_landmarks(path, image_size=(640, 480))
+    file = fio.load_landmarks(path)
     assert file.image_size == (40, 30)
     assert file.image_size_from == f"size of faces{extension}"
 
 
-def test_without_a_picture_the_given_size_counts(path):
-    file = fio.load_landmarks(path, image_size=(640, 480))
-    assert (file.image_size, file.image_size_from) == ((640, 480), "given")
+@pytest.mark.parametrize("beside", [False, True])
+def test_a_size_that_is_given_counts(path, beside):
+    if beside:  # as for a picture that its EXIF turns, or that has another name
+        picture(path.with_suffix(".png"))
+    file = fio.load_landmarks(path, image_size=(640, 650))
+    assert (file.image_size, file.image_size_from) == ((640, 650), "given")
 
 
 def test_without_any_size_the_middle_of_the_points_is_announced(path):
@@ -262,68 +272,270 @@ def test_a_real_photograph_is_read():
     assert fa.Observation(file.points, file.scheme, image_size=file.image_size).visible.all()
 
 
-# Schemes of models
-
-SCHEME = """# a remark, with, commas
-name,side,vertex,definition,confidence
-n,mid,3,"root, of the nose",high
-
-ex,right,0,corner,low
-ex,left,1,corner,low
-en,right,2,corner,low
-en,left,4,corner,low
-"""
+# Which points they are
 
 
-@pytest.fixture
-def table(tmp_path) -> Path:
-    return written(tmp_path / "small_farkas.csv", SCHEME.encode())
+def json_file(folder: Path, value: object) -> Path:
+    return written(folder / "face.json", json.dumps(value).encode())
 
 
-def test_a_point_of_both_sides_is_named_by_its_side(table):
-    scheme = load_scheme(table, "farkas")
-    assert scheme.name == "farkas"
-    assert scheme.points == ("n", "ex_r", "ex_l", "en_r", "en_l")
-    assert scheme.vertices.tolist() == [3, 0, 1, 2, 4]
-    assert scheme.sides == ("mid", "right", "left", "right", "left")
-    assert scheme.eyes == ((1, 3), (4, 2))
-    assert scheme.eyes_meaning == "mean of the outer and inner corner of each eye (ex, en)"
+MESH = np.random.default_rng(4).uniform(0.2, 0.8, (478, 2))
+JAW = tuple(str(k) for k in range(1, 18))
+
+
+def test_51_points_are_the_last_of_68(path):
+    path.write_text(pts(ROWS[17:], head="version: 1\n{\n"))
+    file = fio.load_landmarks(path)
+    assert file.points.shape == (68, 2)
+    assert np.array_equal(file.points[17:], POINTS[17:])
+    assert np.isnan(file.points[:17]).all()
+    assert file.words == "51 of 68 points used; 17 not in the file (1 to 17)"
+
+
+@pytest.mark.parametrize("count", [468, 478])
+def test_a_face_mesh_becomes_the_points_of_ibug_without_the_jaw(tmp_path, count):
+    file = fio.load_landmarks(json_file(tmp_path, MESH[:count].tolist()), image_size=(1000, 500))
+    assert file.scheme == "ibug68"
+    assert file.names == tuple(str(k) for k in range(1, 69))
+    xy = MESH * [1000, 500]
+    # eye corners, nose tip, mouth corners: 36, 45, 30, 48, 54 from 0
+    assert np.array_equal(file.points[[36, 45, 30, 48, 54]], xy[[33, 263, 4, 61, 291]])
+    assert file.points[27] == pytest.approx((xy[168] + xy[6]) / 2, rel=1e-15)
+    assert np.array_equal(file.points[[31, 35]], xy[[98, 327]])  # the better rows
+    assert file.left_out == {"of the jaw, where MediaPipe's outline runs nearer the ear": JAW}
+    assert file.words.startswith("51 of 68 points used; 17 of the jaw, where MediaPipe's outline")
+    assert file.unit == "fractions of the picture of 1000 x 500 pixels"
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
-    [
-        (
-            "name,side",
-            "name;side",
-            "small_farkas.csv: expected the columns name, side, vertex, found name;side,vertex",
-        ),
-        (SCHEME, "", "small_farkas.csv: expected the columns name, side, vertex, found "),
-        (
-            "ex,right,0",
-            "ex,west,0",
-            "line 5 of small_farkas.csv: expected a side (right, left, mid) and a vertex number",
-        ),
-        (
-            "ex,right,0",
-            "ex,right,-1",
-            "line 5 of small_farkas.csv: expected a side (right, left, mid) and a vertex",
-        ),
-        ("ex,right,0", "ex,right,1.5", "found 'right', '1.5'"),
-        ("ex,right,0", "ex,right", "line 5 of small_farkas.csv: 4 cells, the header has 5"),
-        ("ex,right,0", "x" * 200_000, "line 5 of small_farkas.csv: 0 cells, the header has 5"),
-        ("ex,left", "ex,right", "small_farkas.csv: point 'ex_r' is named twice"),
-        ("en,", "em,", "small_farkas.csv: no eye corners among the points"),
-    ],
+    ("first", "names"),
+    [(1, None), (1, range(1, 69)), (0, range(68)), (1, [f"{k:02d}" for k in range(1, 69)])],
 )
-def test_a_damaged_scheme_is_named_with_its_line(table, old, new, said):
-    table.write_text(SCHEME.replace(old, new))
-    with pytest.raises(AssetError, match=re.escape(said)):
-        load_scheme(table, "farkas")
+def test_numbers_are_those_of_ibug_from_one_or_all_from_zero(tmp_path, first, names):
+    rows = [{"x": x, "y": y} for x, y in POINTS.tolist()]
+    if names is not None:
+        rows = [{"name": name, **row} for name, row in zip(names, rows, strict=True)][::-1]
+    file = fio.load_landmarks(json_file(tmp_path, rows))
+    assert np.array_equal(file.points, POINTS)
 
 
-def test_a_vertex_that_the_model_lacks_is_refused(table):
-    scheme = load_scheme(table, "farkas")
-    assert check_scheme(scheme, 5, table.name) is scheme
-    with pytest.raises(AssetError, match=r"small_farkas\.csv: vertex 4 is not within 0 to 3"):
-        check_scheme(scheme, 4, table.name)
+def test_some_numbered_points_are_laid_out_and_the_others_missing(tmp_path):
+    some = {str(k): POINTS[k - 1].tolist() for k in (46, 9, 31, 37, 40, 43, 49, 55)}
+    file = fio.load_landmarks(json_file(tmp_path, {"points": some | {"1": None}}))
+    assert np.array_equal(
+        np.flatnonzero(~np.isnan(file.points[:, 0])) + 1, sorted(map(int, set(some)))
+    )
+    assert file.words.startswith(
+        "8 of 68 points used; 60 not in the file (1, 2, 3, 4, 5, 6, 7, 8 and 52 more)"
+    )
+
+
+def test_named_points_of_a_mesh_are_taken_from_it(tmp_path):
+    some = {str(k): MESH[k].tolist() for k in range(478) if k not in (4, 33)}
+    file = fio.load_landmarks(json_file(tmp_path, {"points": some}), image_size=(100, 100))
+    assert file.left_out["not in the file"] == ("31", "37")
+    assert file.used == 49
+
+
+def test_farkas_points_are_matched_by_name(tmp_path, embedded):
+    scheme = embedded.scheme("farkas")
+    view = fa.observe(embedded.subject(1), distance=0.6, scheme="farkas")
+    some = [k for k, name in enumerate(scheme.points) if name[0] in "nespc"][::-1]
+    text = "name,x,y\n" + "\n".join(
+        f"{scheme.points[k]},{view.points[k, 0]:.9f},{view.points[k, 1]:.9f}" for k in some
+    )
+    path = written(tmp_path / "face.csv", f"{text}\nwart,1,2\n".encode())
+    alone = fio.load_landmarks(path)
+    assert alone.names == (*(scheme.points[k] for k in some), "wart")
+    file = fio.load_landmarks(path, model=embedded)
+    assert (file.scheme, file.names) == ("farkas", scheme.points)
+    assert np.abs(file.points[some] - view.points[some]).max() < 1e-9
+    assert file.words == (
+        f"{len(some)} of {len(some) + 1} points used; 1 without a vertex in scheme farkas of embedded (wart)"
+    )
+    fit = fa.fit(embedded, fa.Observation(file.points, file.scheme, view.image_size), distance=0.6)
+    assert fit.converged
+    assert fit.d_l_percent < 1
+
+
+def test_a_model_with_some_of_the_points_gets_those(path, embedded):
+    whole = embedded.scheme("ibug68")
+    keep = [8, 27, 30, 33, 36, 39, 42, 45, 48, 54]
+    part = fa.Scheme(
+        "ibug68", tuple(whole.points[k] for k in keep), whole.vertices[keep],
+        tuple(whole.sides[k] for k in keep), ((4, 5), (6, 7)), whole.eyes_meaning,
+    )  # fmt: skip
+    model = replace(embedded, name="part", schemes={"ibug68": part})
+    file = fio.load_landmarks(path, model=model)
+    assert np.array_equal(file.points, POINTS[keep])
+    assert file.words.startswith(
+        "10 of 68 points used; 58 without a vertex in scheme ibug68 of part (1, 2,"
+    )
+    assert (
+        fa.Observation(file.points, file.scheme).vertices(model).tolist() == part.vertices.tolist()
+    )
+
+
+def test_points_no_model_knows_are_refused(tmp_path, embedded):
+    names = {f"wart{k}": [k, k * k] for k in range(9)}
+    path = json_file(tmp_path, {"points": names})
+    with pytest.raises(
+        AssetError, match=r"face\.json: 0 of 9 points used; 9 without a vertex in scheme farkas of"
+    ):
+        fio.load_landmarks(path, model=embedded)
+    path = json_file(tmp_path, {"scheme": "warts", "points": names})
+    assert fio.load_landmarks(path).scheme == "warts"
+    with pytest.raises(
+        ValueError, match="unknown scheme 'warts': this model has ibug68, farkas or mediapipe"
+    ):
+        fio.load_landmarks(path, model=embedded)
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        (POINTS[:67].tolist(), "67 points without names; 68 or 51 (iBUG), 468 or 478 (MediaPipe)"),
+        (MESH[:470].tolist(), "470 points without names"),
+        ({"scheme": "farkas", "points": POINTS.tolist()}, "68 points of scheme 'farkas' without names"),
+        ({"scheme": "ibug68", "points": MESH.tolist()}, "478 points of scheme 'ibug68' without names"),
+        ({"points": {"1": [3, 4], "69": [1, 2]}}, "point 69 is not within 1 to 68"),
+        ({"points": {"0": [3, 4], "9": [1, 2]}}, "point 0 is not within 1 to 68"),
+        ({"points": {"1": [3, 4], "01": [1, 2]}}, "a point is named twice"),
+        ({"points": {str(k): [k, k] for k in range(420, 500)}}, "point 478 is not within 0 to 477"),
+        ({"scheme": "jawline", "points": {"ex_r": [3, 4]}}, "point 'ex_r' is not a number, those of jawline"),
+        ({"scheme": "ibug68", "image_size": [640, 0], "points": []}, "image_size [640, 0] is not [width, height]"),
+        ({"scheme": "ibug68", "image_size": [640, True], "points": []}, "image_size [640, True] is not"),
+        ({"scheme": "ibug68", "image_size": "640x480", "points": []}, "image_size '640x480' is not"),
+        ({"scheme": 68, "points": POINTS.tolist()}, "scheme 68 is not a name"),
+        ({"points": {}}, "face.json: no points"),
+    ],
+)  # fmt: skip
+def test_other_points_are_refused_with_what_is_accepted(tmp_path, value, said):
+    with pytest.raises(AssetError, match=re.escape(said)) as caught:
+        fio.load_landmarks(json_file(tmp_path, value))
+    assert str(caught.value).startswith("face.json: ")
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 150
+
+
+# Pixels, fractions, and the edge of the picture
+
+
+def test_fractions_are_multiplied_by_the_size_of_the_picture(tmp_path, path):
+    picture(tmp_path / "face.png", 40, 30)
+    file = fio.load_landmarks(json_file(tmp_path, (POINTS / 640).tolist()))
+    assert np.abs(file.points - POINTS / 640 * [40, 30]).max() < 1e-13
+    assert file.unit == "fractions of the picture of 40 x 30 pixels"
+    assert file.image_size_from == "size of face.png"
+    assert fio.load_landmarks(path).unit == "pixels"
+
+
+def test_fractions_of_an_unknown_picture_are_refused_with_the_way(tmp_path):
+    path = json_file(tmp_path, MESH.tolist())
+    with pytest.raises(
+        AssetError, match=r"^face\.json: coordinates from 0\.2\d* to 0\.\d+ are fractions of the"
+    ) as caught:
+        fio.load_landmarks(path)
+    assert "give its size (--image-size 640x480), or put it beside the file" in str(caught.value)
+
+
+@pytest.mark.parametrize("shift", [-0.4, 0.4])
+def test_a_mesh_that_leaves_the_picture_is_still_of_fractions(tmp_path, shift):
+    path = json_file(tmp_path, (MESH + np.array([shift, 0])).tolist())
+    file = fio.load_landmarks(path, image_size=(1000, 1000))
+    (gone,) = (names for reason, names in file.left_out.items() if reason == "outside the picture")
+    rows = [int(name) - 1 for name in gone]
+    inner = ibug68_of_mesh(MESH)[17:, 0] + shift
+    assert sorted(rows) == (np.flatnonzero((inner < -0.001) | (inner > 1.001)) + 17).tolist()
+    assert np.isnan(file.points[rows]).all()
+    assert f"; {len(gone)} outside the picture (" in file.words
+
+
+@pytest.mark.parametrize("points", [2 * MESH - 1, MESH - 0.6])  # of -1 to 1, or about the middle
+def test_coordinates_that_are_neither_are_refused(tmp_path, points):
+    path = json_file(tmp_path, points.tolist())
+    with pytest.raises(
+        AssetError, match=r"face\.json: coordinates from -0\.\d+ to 0\.\d+ are neither pixels nor"
+    ):
+        fio.load_landmarks(path, image_size=(1000, 1000))
+
+
+def test_points_outside_the_picture_are_said_and_left_out(path):
+    moved = POINTS.copy()
+    moved[2] = [-20, 10]
+    moved[3] = [10, 650.9]
+    moved[4] = [640.9, 650.9]  # counted from 1, the last pixel's far edge is at 650.5
+    path.write_text(pts([f"{x:.6f} {y:.6f}" for x, y in moved]))
+    file = fio.load_landmarks(path, image_size=(661, 650))
+    assert file.left_out == {"outside the picture": ("3",)}
+    assert file.words == "67 of 68 points used; 1 outside the picture (3)"
+    assert np.isnan(file.points[2]).all()
+    assert np.array_equal(file.points[3:], moved[3:])
+
+
+def test_a_picture_smaller_than_the_face_is_refused(path):
+    box = np.ptp(POINTS, axis=0)
+    for size in ((600, 700), (700, 600)):
+        with pytest.raises(
+            AssetError,
+            match=r"^faces\.pts: the points span [\d.]+ x [\d.]+ pixels, the picture has",
+        ) as caught:
+            fio.load_landmarks(path, image_size=size)
+        assert f"{size[0]} x {size[1]} (given); is it the picture of these points?" in str(
+            caught.value
+        )
+    assert fio.load_landmarks(path, image_size=tuple(np.ceil(box).astype(int).tolist())).used > 60
+    picture(path.with_suffix(".png"))
+    with pytest.raises(AssetError, match=r"has 40 x 30 \(size of faces\.png\); is it"):
+        fio.load_landmarks(path)
+
+
+def test_a_face_outside_the_picture_is_refused_with_the_count(path):
+    path.write_text(pts([f"{x + 5000:.6f} {y:.6f}" for x, y in POINTS]))
+    with pytest.raises(
+        AssetError, match=r"0 of 68 points used; 68 outside the picture \(1 to 68\); 6 are needed"
+    ):
+        fio.load_landmarks(path, image_size=(800, 800))
+
+
+# Our own file
+
+
+def test_what_is_saved_is_read_again(tmp_path, path):
+    points = POINTS.copy()
+    points[5] = np.nan
+    first = fio.LandmarkFile(points, "ibug68", (640, 660))
+    fio.save_landmarks(first, tmp_path / "face.json")
+    again = fio.load_landmarks(tmp_path / "face.json")
+    assert np.array_equal(again.points, points, equal_nan=True)  # bit by bit
+    assert (again.scheme, again.names, again.image_size) == ("ibug68", first.names, (640, 660))
+    assert again.image_size_from == "said by face.json"
+    assert again.words == "67 of 68 points used; 1 not in the file (6)"
+    value = json.loads((tmp_path / "face.json").read_text())
+    assert (value["format"], value["version"]) == ("faceambig-landmarks", 1)
+    assert value["points"]["6"] is None
+    assert [file.name for file in tmp_path.iterdir() if file.name.startswith(".")] == []
+    farkas = fio.LandmarkFile(POINTS[:4], "farkas", names=("n", "ex_r", "ex_l", "sn"))
+    fio.save_landmarks(farkas, tmp_path / "face.json")
+    again = fio.load_landmarks(tmp_path / "face.json")
+    assert (again.scheme, again.names, again.image_size) == ("farkas", farkas.names, None)
+    assert np.array_equal(again.points, farkas.points)
+
+
+def test_points_of_another_picture_are_refused(tmp_path):
+    fio.save_landmarks(fio.LandmarkFile(POINTS, "ibug68", (640, 660)), tmp_path / "face.json")
+    assert fio.load_landmarks(tmp_path / "face.json", image_size=(640, 660)).used == 68
+    said = r"face\.json: made for a picture of 640 x 660 pixels, this one has 1280 x 1320 \(given\)"
+    with pytest.raises(AssetError, match=said):
+        fio.load_landmarks(tmp_path / "face.json", image_size=(1280, 1320))
+    picture(tmp_path / "face.png")
+    with pytest.raises(AssetError, match=r"this one has 40 x 30 \(size of face\.png\)"):
+        fio.load_landmarks(tmp_path / "face.json")
+
+
+def test_a_later_version_of_our_file_is_refused(tmp_path):
+    path = json_file(tmp_path, {"format": "faceambig-landmarks", "version": 2, "points": []})
+    with pytest.raises(
+        AssetError, match=r"face\.json: version 2 of faceambig-landmarks; 1 is read"
+    ):
+        fio.load_landmarks(path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -138,9 +139,27 @@ def test_subjects_count_from_one():
         MODEL.subject(1)
     model = replace(MODEL, subjects=(face_of(MODEL, np.ones(S)), face_of(MODEL, -np.ones(S))))
     assert np.array_equal(model.subject(2).vertices, MODEL.vertices(-np.ones(S)))
+    assert model.subject(np.int64(2)) is model.subjects[1]  # pyright: ignore[reportArgumentType]
     for bad in (0, 3, -1):
         with pytest.raises(ValueError, match=f"unknown subject {bad}: 1 to 2"):
             model.subject(bad)
+    with pytest.raises(ValueError, match="unknown subject a number of that many digits: 1 to 2"):
+        model.subject(10**5000)
+
+
+@pytest.mark.parametrize("bad", ["a", "1", 1.0, None, True, [1], {}, np.zeros(2)])
+def test_what_is_no_number_or_no_name_is_refused_in_one_line(bad: Any):
+    model = replace(MODEL, subjects=(face_of(MODEL, np.ones(S)),))
+    with pytest.raises(ValueError, match=r"^subject: .* is not a whole number$"):
+        model.subject(bad)
+    with pytest.raises(ValueError, match=r"^unknown scheme .*: this model has all$"):
+        model.scheme(bad)
+
+
+def test_a_scheme_lists_name_side_and_vertex():
+    scheme = MODEL.scheme("all")
+    assert len(scheme.rows()) == len(scheme)
+    assert scheme.rows()[2] == (scheme.points[2], scheme.sides[2], int(scheme.vertices[2]))
 
 
 def test_the_embedded_heads_landmarks_come_by_either_route(embedded):

@@ -374,7 +374,7 @@ def test_a_name_cannot_lead_out_of_the_folder(tmp_path):
     (tmp_path / "inside" / "schemes").mkdir(parents=True)
     (tmp_path / "outside_ibug68.csv").write_text("not a scheme")
     path = write(tmp_path / "inside" / "a.npz", {"name": "../../outside"})
-    assert list(fio.load_model(path).schemes) == ["ibug68"]
+    assert list(fio.load_model(path).schemes) == ["ibug68", "mediapipe"]
 
 
 @pytest.fixture(scope="module")
@@ -461,7 +461,7 @@ def test_the_embedded_head_is_complete(embedded):
     assert embedded.name == "embedded"
     assert embedded.n_modes == 100
     assert len(embedded.subjects) == 10
-    assert list(embedded.schemes) == ["ibug68", "farkas"]
+    assert list(embedded.schemes) == ["ibug68", "farkas", "mediapipe"]
     assert "CC0" in embedded.licence
     assert embedded.evaluation is not None
     assert len(embedded.evaluation) > 9_000  # the front of the head (HEAD.md 7)

@@ -126,7 +126,7 @@ def test_page_and_snapshot_are_importable_by_their_names():
         _ = faceambig_app.photo
 
 
-@pytest.mark.parametrize("arguments", [[], ["snapshot"], ["fit"], ["sweep"], ["serve"]])
+@pytest.mark.parametrize("arguments", [[], ["snapshot"], ["fit"], ["sweep"], ["models"], ["serve"]])
 def test_help_is_printed_without_loading_anything_heavy(arguments):
     # 17 ms instead of a second: numpy, viser, cv2 and pyrender come only with the work
     code = (

@@ -89,6 +89,7 @@ def parser() -> Parser:
     )
     _fit(commands.add_parser("fit", help="fit a face to the points of a photograph"))
     _sweep(commands.add_parser("sweep", help="fit at many distances"))
+    _models(commands.add_parser("models", help="what a model holds: modes, landmark schemes"))
     return root
 
 
@@ -129,7 +130,10 @@ def _snapshot(command: argparse.ArgumentParser) -> None:
 
 def _points(command: argparse.ArgumentParser) -> None:
     command.add_argument(
-        "points", metavar="FILE.pts", help="landmarks of the photograph (68 points of iBUG)"
+        "points",
+        metavar="FILE",
+        help="landmarks of the photograph: .pts, CSV with x and y, or JSON; 68 or 51 points of iBUG, "
+        "468 or 478 of MediaPipe, or points with names",
     )
     _options(command)
 
@@ -141,7 +145,7 @@ def _options(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--image-size",
         metavar="WxH",
-        help="size of the picture in pixels, if it does not lie beside the points",
+        help="size of the picture in pixels (default: of the picture of the same name beside the points)",
     )
     command.add_argument(
         "--modes",
@@ -213,6 +217,21 @@ def _sweep(command: argparse.ArgumentParser) -> None:
     command.set_defaults(run=run_sweep)
 
 
+def _models(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "model",
+        nargs="?",
+        default="embedded",
+        metavar="MODEL",
+        help="model name or path (default embedded)",
+    )
+    command.add_argument(
+        "--scheme", metavar="NAME", help="list the points of this scheme: name, side, vertex"
+    )
+    command.add_argument("--json", action="store_true", help="print JSON for programs")
+    command.set_defaults(run=run_models)
+
+
 def run_serve(options: argparse.Namespace) -> int:
     """Serve the page until interrupted."""
     from .server import serve
@@ -256,7 +275,7 @@ def run_fit(options: argparse.Namespace) -> int:
     out = None if options.out is None else photo.folder(options.out)  # before the work, not after
     model = fa.load_model(options.model)
     start = photo.given(
-        Path(options.file), landmarks=None if options.landmarks is None else Path(options.landmarks),
+        Path(options.file), model, landmarks=None if options.landmarks is None else Path(options.landmarks),
         auto=options.auto, image_size=image_size(options.image_size), pixels=options.contours or out is not None,
     )  # fmt: skip
     outcome = photo.fitted(
@@ -264,7 +283,7 @@ def run_fit(options: argparse.Namespace) -> int:
         modes=options.modes, box=options.box, noise_percent=options.prior,
     )  # fmt: skip
     fit, picture = outcome.fit, start.picture
-    notes = notes_of(start.observation, start.image_size_from)
+    notes = notes_of(start.observation, start.image_size_from, start.landmarks)
     lines = fit_lines(fit, notes)
     record = fit_record(fit) | notes
     said: list[str] = []
@@ -296,6 +315,7 @@ def fit_lines(fit: fa.Fit, notes: dict[str, Any]) -> list[str]:
         f"{fit.status}: camera at {where}, landmark error d_L {fit.d_l_percent:.2f} % of the interocular distance",
         f"interocular distance: {fit.interocular_px:.1f} px, {fit.interocular_meaning}",
         f"principal point: {notes['principal_point']}; picture size: {notes['image_size_from']}",
+        f"landmarks: {notes['landmarks']}",
     ]
 
 
@@ -310,9 +330,10 @@ def run_sweep(options: argparse.Namespace) -> int:
             f"--from {options.low:g} --to {options.high:g} --steps {options.steps}: "
             "from at least 0.2 m up to `to`, 1 to 1000 steps"
         )
-    observation, notes = observation_of(options)
+    model = fa.load_model(options.model)
+    observation, notes = observation_of(options, model)
     sweep = fa.sweep_distance(
-        fa.load_model(options.model), observation, np.geomspace(options.low, options.high, options.steps),
+        model, observation, np.geomspace(options.low, options.high, options.steps),
         modes=options.modes, box=options.box, noise_percent=options.prior,
     )  # fmt: skip
     interval = sweep.interval()
@@ -354,6 +375,7 @@ def run_sweep(options: argparse.Namespace) -> int:
         print(
             f"principal point: {notes['principal_point']}; picture size: {notes['image_size_from']}"
         )
+        print(f"landmarks: {notes['landmarks']}")
     return GOOD if all(fit.converged for fit in fits) else NOT_CONVERGED
 
 
@@ -373,22 +395,57 @@ def interval_words(interval: fa.Interval) -> str:
     )
 
 
-def observation_of(options: argparse.Namespace) -> tuple[fa.Observation, dict[str, Any]]:
+def run_models(options: argparse.Namespace) -> int:
+    """Say what a model holds, or list one of its schemes."""
+    import faceambig as fa
+
+    model = fa.load_model(options.model)
+    chosen = [model.scheme(options.scheme)] if options.scheme else list(model.schemes.values())
+    if options.json:
+        keys = ("name", "side", "vertex")
+        schemes = {
+            scheme.name: [dict(zip(keys, row, strict=True)) for row in scheme.rows()]
+            for scheme in chosen
+        }
+        about = {"name": model.name, "source": model.source, "licence": model.licence}
+        sizes = {
+            "vertices": model.n_vertices,
+            "modes": model.n_modes,
+            "subjects": len(model.subjects),
+        }
+        print(json.dumps(about | sizes | {"schemes": schemes}))
+    elif options.scheme:
+        for name, side, vertex in chosen[0].rows():
+            print(f"{name:>6} {side:>6} {vertex:6}")
+    else:
+        print(f"{model.name}: {model.source}; {model.licence}")
+        print(f"{model.n_vertices} vertices, {model.n_modes} modes, {len(model.subjects)} subjects")
+        for scheme in chosen:
+            print(f"scheme {scheme.name}: {len(scheme)} points; eyes: {scheme.eyes_meaning}")
+    return GOOD
+
+
+def observation_of(
+    options: argparse.Namespace, model: fa.FaceModel
+) -> tuple[fa.Observation, dict[str, Any]]:
     """The points of a file, and what was assumed about their picture."""
     import faceambig as fa
 
-    read = fa.load_landmarks(options.points, image_size=image_size(options.image_size))
+    size = image_size(options.image_size)
+    read = fa.load_landmarks(options.points, image_size=size, model=model)
     observation = fa.Observation(read.points, read.scheme, image_size=read.image_size)
-    return observation, notes_of(observation, read.image_size_from)
+    words = f"{read.words}; {read.scheme}, {read.unit}"
+    return observation, notes_of(observation, read.image_size_from, words)
 
 
-def notes_of(observation: fa.Observation, image_size_from: str) -> dict[str, Any]:
+def notes_of(observation: fa.Observation, image_size_from: str, landmarks: str) -> dict[str, Any]:
     """What was assumed about a picture."""
     cx, cy = observation.centre
     return {
         "points_used": int(observation.visible.sum()),
         "principal_point": f"({cx:g}, {cy:g}), {observation.centre_meaning}",
         "image_size_from": image_size_from,
+        "landmarks": landmarks,
     }
 
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 import faceambig as fa
+from faceambig.io import LandmarkFile
 from faceambig.io.pictures import Picture, is_picture, picture_beside, read_picture
 
 from .pipeline import write_all
@@ -29,6 +30,7 @@ class Given:
 
     observation: fa.Observation
     image_size_from: str  # in words
+    landmarks: str  # what of them is used, in words
     picture: Picture | None  # None: only the points are known, and that suffices
 
 
@@ -43,6 +45,7 @@ class Outcome:
 
 def given(
     file: Path,
+    model: fa.FaceModel,
     *,
     landmarks: Path | None = None,
     auto: bool = False,
@@ -67,30 +70,30 @@ def given(
             raise ValueError(
                 f"{file.name}: a picture; its points are read with --landmarks FILE or found with --auto"
             )
-        read = fa.load_landmarks(file, image_size=image_size)
+        read = fa.load_landmarks(file, image_size=image_size, model=model)
         observation = fa.Observation(read.points, read.scheme, image_size=read.image_size)
         picture = _beside(file) if pixels else None
-        if picture is not None:
-            _check_box(observation.points, picture, file.name)
-        return Given(observation, read.image_size_from, picture)
+        if picture is not None and read.image_size != picture.size:
+            raise ValueError(
+                f"--image-size: the picture beside {file.name} is {picture.size[0]} x {picture.size[1]}; leave it out"
+            )
+        return Given(observation, read.image_size_from, _words(read), picture)
     picture = read_picture(file)
     if image_size is not None:
         raise ValueError(
             f"--image-size: {picture.name} is given, {picture.size[0]} x {picture.size[1]}; leave it out"
         )
     if landmarks is None:
-        points, scheme = _found(picture), "ibug68"
+        points, scheme, words = _found(picture), "ibug68", "found by the networks, without the jaw"
     else:
-        read = fa.load_landmarks(landmarks, image_size=picture.size)
-        points, scheme = read.points, read.scheme
-        if read.image_size is not None and read.image_size != picture.size:
-            raise ValueError(
-                f"{landmarks.name}: {read.image_size_from} is {read.image_size[0]} x {read.image_size[1]}, "
-                f"{picture.name} {picture.size[0]} x {picture.size[1]}; which one do the points belong to?"
-            )
-        _check_box(points, picture, landmarks.name)
+        read = fa.load_landmarks(landmarks, image_size=picture.size, model=model)
+        points, scheme, words = read.points, read.scheme, _words(read)
     observation = fa.Observation(points, scheme, image_size=picture.size)
-    return Given(observation, f"size of {picture.name}", picture)
+    return Given(observation, f"size of {picture.name}", words, picture)
+
+
+def _words(read: LandmarkFile) -> str:
+    return f"{read.words}; {read.scheme}, {read.unit}"
 
 
 def _beside(file: Path) -> Picture:
@@ -100,24 +103,6 @@ def _beside(file: Path) -> Picture:
             f"{file.name}: no picture of the same name beside it; give the photograph, and the points by --landmarks"
         )
     return read_picture(path)
-
-
-def _check_box(points: np.ndarray, picture: Picture, file: str) -> None:
-    """ValueError if the points span more than the picture: they are of another one."""
-    seen = points[np.isfinite(points).all(axis=1)]
-    if not len(seen):
-        return  # the Observation says so
-    wide, high = np.ptp(seen, axis=0)
-    if wide > picture.size[0] or high > picture.size[1]:
-        raise ValueError(
-            f"{file}: its points span {wide:.0f} x {high:.0f} pixels, {picture.name} has only {picture.size[0]} x "
-            f"{picture.size[1]}; give the picture they were placed on"
-        )
-    if not ((seen >= 0) & (seen <= picture.size)).all(axis=1).any():
-        raise ValueError(
-            f"{file}: none of its points lies in {picture.name}, {picture.size[0]} x {picture.size[1]}; "
-            "give the picture they were placed on"
-        )
 
 
 def _found(picture: Picture) -> np.ndarray:

@@ -12,11 +12,20 @@ import numpy as np
 from ..arrays import Array
 from ..errors import AssetError
 from ..model import FaceModel
+from .files import asset_path
 from .ict import is_ict, read_ict
-from .landmarks import LandmarkFile, load_landmarks
-from .npz import asset_path, is_npz_model, read_npz, save_model
+from .landmarks import LandmarkFile, load_landmarks, save_landmarks
+from .npz import is_npz_model, read_npz, save_model
+from .schemes import MEDIAPIPE, mediapipe_scheme
 
-__all__ = ["LandmarkFile", "load_landmarks", "load_model", "save_model"]
+__all__ = [
+    "LandmarkFile",
+    "asset_path",
+    "load_landmarks",
+    "load_model",
+    "save_landmarks",
+    "save_model",
+]
 
 # Millimetres on the mean of an adult model: ibug68 points of each end, lowest, highest. Six public
 # models lie within 87-93, 33-39 and 62-66; the ranges leave room for another population.
@@ -58,7 +67,7 @@ def load_model(
         raise ValueError(f"part: {part!r} is not face or head")
     if origin not in ("eyes", "file"):
         raise ValueError(f"origin: {origin!r} is not eyes or file")
-    model = _read(_located(path), part)
+    model = _with_mediapipe(_read(_located(path), part))
     _check_size(model)
     shift = model.file_origin if origin == "file" else _between_the_eyes(model)
     return _moved(model, shift)
@@ -85,6 +94,14 @@ def _read(path: Path, part: str) -> FaceModel:
     raise AssetError(
         f"{path}: not a model; an ICT-FaceKit folder (with FaceXModel/) or an .npz of faceambig is accepted"
     )
+
+
+def _with_mediapipe(model: FaceModel) -> FaceModel:
+    """`model` with the scheme of MediaPipe's mesh, if it has the points of iBUG and not yet that scheme."""
+    if "ibug68" not in model.schemes or MEDIAPIPE in model.schemes:
+        return model
+    scheme = mediapipe_scheme(model.schemes["ibug68"])
+    return model if scheme is None else replace(model, schemes={**model.schemes, MEDIAPIPE: scheme})
 
 
 def _check_size(model: FaceModel) -> None:

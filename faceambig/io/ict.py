@@ -22,8 +22,9 @@ from numpy.typing import NDArray
 from ..arrays import Array
 from ..errors import AssetError
 from ..model import FaceModel
-from .landmarks import check_scheme, load_scheme
-from .npz import asset_path, read_npz, save_model
+from .files import asset_path
+from .npz import read_npz, save_model
+from .schemes import schemes_in
 
 CENTIMETRE = 0.01
 CACHE_VERSION = 1  # raise it when what is kept changes
@@ -129,13 +130,12 @@ def _parse(files: list[Path]) -> FaceModel:
 def _cut(head: FaceModel, part: str) -> FaceModel:
     """The face or the head, with its landmarks; d_S is measured on the face part of both."""
     n = PARTS[part].vertices
-    scheme = load_scheme(asset_path("schemes/ict_ibug68.csv"), "ibug68")
     return replace(
         head,
         control_mean=head.control_mean[:n],
         control_modes=head.control_modes[:n],
         faces=head.faces[(head.faces < n).all(axis=1)],
-        schemes={"ibug68": check_scheme(scheme, n, "ict_ibug68.csv")},
+        schemes=schemes_in(asset_path("schemes"), "ict", n),
         evaluation=None if part == "face" else np.arange(PARTS["face"].vertices),
     )
 

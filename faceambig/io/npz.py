@@ -34,7 +34,6 @@ from __future__ import annotations
 
 import os
 import re
-import tempfile
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
@@ -50,7 +49,8 @@ from scipy import sparse
 from ..arrays import Array, IntArray
 from ..errors import AssetError
 from ..model import FaceModel, Scheme, Subject
-from .landmarks import check_scheme, load_scheme
+from .files import replacing
+from .schemes import schemes_in
 
 FORMAT, VERSION = "faceambig-model", 1
 # Of all arrays as float64; the largest public model, 53,490 vertices and 199 modes, needs 255 MB
@@ -104,13 +104,6 @@ HEADER = re.compile(
 )
 
 
-def asset_path(name: str) -> Path:
-    """A file of ours: beside the installed package, or in the checkout."""
-    package = Path(__file__).resolve().parents[1]
-    installed = package / "_assets"
-    return (installed if installed.is_dir() else package.parent / "assets") / name
-
-
 def is_npz_model(path: Path) -> bool:
     """Whether `path` is a zip with the arrays of a model; damage inside is for `read_npz` to name."""
     try:
@@ -139,13 +132,9 @@ def save_model(model: FaceModel, path: str | os.PathLike[str]) -> None:
     ------
     ValueError: a vertex is in two regions, which the format cannot hold.
     """
-    file = Path(path)
     arrays = _stored(model)
-    with tempfile.TemporaryDirectory(dir=file.parent, prefix=".faceambig-") as folder:
-        whole = Path(folder) / file.name
-        with whole.open("wb") as stream:
-            np.savez(stream, **arrays)
-        whole.replace(file)  # readers see the old file or the new one, never half of one
+    with replacing(path) as whole, whole.open("wb") as stream:
+        np.savez(stream, **arrays)
 
 
 @dataclass(frozen=True, slots=True)
@@ -402,13 +391,7 @@ def _schemes_beside(path: Path, model: str, n_vertices: int) -> dict[str, Scheme
     # The name comes from the file: it must not lead out of the folder
     if not re.fullmatch(r"[\w-]{1,40}", model):
         return {}
-    files = sorted((path.parent / "schemes").glob(f"{model}_*.csv"))
-    names = [file.stem.removeprefix(f"{model}_") for file in files]
-    # ibug68 first: the scheme a caller gets who names none
-    order = sorted(zip(names, files, strict=True), key=lambda pair: (pair[0] != "ibug68", pair[0]))
-    return {
-        name: check_scheme(load_scheme(file, name), n_vertices, file.name) for name, file in order
-    }
+    return schemes_in(path.parent / "schemes", model, n_vertices)
 
 
 def _stored_schemes(arrays: Mapping[str, NDArray[Any]], n_vertices: int) -> dict[str, Scheme]:

@@ -16,11 +16,12 @@ import pytest
 
 import faceambig as fa
 from commands import RECORD, printed, refused, write_pts
+from faceambig.io.schemes import mesh_of_ibug68
 from faceambig_app import cli, pipeline
 from faceambig_app.state import DEFAULT, FIELDS, ViewState, changed
 from scenes import need_renderer
 
-COMMANDS = ("serve", "snapshot", "fit", "sweep")
+COMMANDS = ("serve", "snapshot", "fit", "sweep", "models")
 
 
 @pytest.fixture(scope="module")
@@ -122,6 +123,62 @@ def test_missing_points_are_left_out_and_counted(capsys, tmp_path, observation):
     file = write_pts(tmp_path / "part.pts", points)
     _, out, _ = printed(capsys, "fit", file, "--json", "--image-size", "500x500")
     assert json.loads(out)["points_used"] == 58
+
+
+MESH = np.random.default_rng(4).uniform(0.3, 0.7, (478, 3))
+
+
+def test_what_became_of_the_points_is_said(capsys, tmp_path, observation):
+    points = observation.points.copy()
+    points[0] = np.nan
+    points[1] = [501.5, 200]
+    rows = "\n".join(f"{k},{x},{y}" for k, (x, y) in enumerate(points, start=1))
+    file = tmp_path / "face.csv"
+    file.write_text(f"name,x,y\n{rows}\n")
+    said = "66 of 68 points used; 1 not in the file (1); 1 outside the picture (2); ibug68, pixels"
+    asked = ("fit", file, "--distance", 0.4, "--image-size", "500x500")
+    _, out, _ = printed(capsys, *asked)
+    assert f"landmarks: {said}\n" in out
+    _, out, _ = printed(capsys, *asked, "--json")
+    assert (json.loads(out)["landmarks"], json.loads(out)["points_used"]) == (said, 66)
+    _, out, _ = printed(capsys, "sweep", *asked[1:2], "--steps", 1, "--image-size", "500x500")
+    assert f"landmarks: {said}\n" in out
+
+
+def test_a_face_mesh_is_fitted_by_the_points_it_shares(capsys, tmp_path, observation):
+    mesh = np.zeros((468, 3))
+    for pair, point in zip(mesh_of_ibug68(), observation.points, strict=True):
+        mesh[list(pair), :2] = point / 500
+    landmarks = [dict(zip("xyz", point, strict=True)) for point in mesh.tolist()]
+    file = tmp_path / "face.json"
+    file.write_text(json.dumps({"face_landmarks": [landmarks]}))
+    asked = ("fit", file, "--distance", 0.4, "--image-size", "500x500", "--json")
+    status, out, _ = printed(capsys, *asked)
+    record = json.loads(out)
+    assert status == 0
+    assert record["points_used"] == 51
+    assert record["landmarks"].startswith("51 of 68 points used; 17 of the jaw, where MediaPipe's")
+    assert record["landmarks"].endswith("; ibug68, fractions of the picture of 500 x 500 pixels")
+    assert record["d_l_percent"] < 1
+
+
+def test_models_says_what_a_model_holds(capsys, embedded):
+    status, out, err = printed(capsys, "models")
+    assert (status, err) == (0, "")
+    assert "14159 vertices, 100 modes, 10 subjects" in out
+    for scheme in embedded.schemes.values():
+        assert f"scheme {scheme.name}: {len(scheme)} points; eyes: {scheme.eyes_meaning}" in out
+    _, out, _ = printed(capsys, "models", "embedded", "--scheme", "farkas")
+    rows = [tuple(line.split()) for line in out.splitlines()]
+    assert rows == [(name, side, str(v)) for name, side, v in embedded.scheme("farkas").rows()]
+    _, out, _ = printed(capsys, "models", "--json")
+    record = json.loads(out)
+    assert (record["name"], record["vertices"], record["modes"]) == ("embedded", 14159, 100)
+    assert list(record["schemes"]) == ["ibug68", "farkas", "mediapipe"]
+    first = {"name": "1", "side": "right", "vertex": int(embedded.scheme("ibug68").vertices[0])}
+    assert record["schemes"]["ibug68"][0] == first
+    _, out, _ = printed(capsys, "models", "--json", "--scheme", "mediapipe")
+    assert list(json.loads(out)["schemes"]) == ["mediapipe"]
 
 
 def test_sweep_prints_every_fit_and_the_interval(capsys, pts, embedded, observation):
@@ -315,6 +372,16 @@ BAD: dict[str, tuple[list[str], str]] = {
     "cut file": (["sweep", "{tmp}/cut.pts"], "cut.pts: ends before }"),
     "five points": (["fit", "{tmp}/five.pts"], "points: 5 visible; 6 are needed"),
     "points on a line": (["fit", "{tmp}/line.pts"], "points: they lie on one line"),
+    "empty file": (["fit", "{tmp}/empty.json"], "empty.json: empty"),
+    "cut JSON": (["fit", "{tmp}/cut.json"], "line 2 of cut.json: not JSON (Expecting value, column 10)"),
+    "damaged table": (["sweep", "{tmp}/damaged.csv"], "line 3 of damaged.csv: expected two numbers, found '3 x'"),
+    "other counts": (["fit", "{tmp}/seven.json"], "seven.json: 7 points without names; 68 or 51 (iBUG), 468 or 478"),
+    "fractions of what": (["fit", "{tmp}/mesh.json"], "give its size (--image-size 640x480)"),
+    "a picture too small": (["fit", "{pts}", "--image-size", "90x500"], "the picture has 90 x 500 (given); is it"),
+    "a face outside": (["fit", "{tmp}/outside.csv", "--image-size", "500x500"], "68 outside the picture (1 to 68)"),
+    "names no model knows": (["fit", "{tmp}/warts.csv"], "8 without a vertex in scheme farkas of embedded (wart0, "),
+    "unknown scheme": (["models", "--scheme", "ibug"], "unknown scheme 'ibug': this model has ibug68, farkas or"),
+    "models of none": (["models", "none"], "none: no such file or folder"),
     "unknown model": (["fit", "{pts}", "--model", "none"], "none: no such file or folder"),
     "a model that is none": (["fit", "{pts}", "--model", "{pts}"], "face.pts: not a model"),
     "distance near": (["fit", "{pts}", "--distance", "0.1"], "distance: 0.1 m is not within 0.2"),
@@ -382,6 +449,15 @@ BAD: dict[str, tuple[list[str], str]] = {
 @pytest.mark.parametrize("name", BAD)
 def test_bad_input_is_one_line_and_exit_status_two(capsys, tmp_path, pts, observation, name):
     (tmp_path / "words.pts").write_text("hello\n")
+    (tmp_path / "empty.json").write_text("\n")
+    (tmp_path / "cut.json").write_text('{"points": [\n[1, 2], [')
+    (tmp_path / "damaged.csv").write_text("x,y\n1,2\n3,x\n")
+    (tmp_path / "seven.json").write_text(json.dumps([[k, k * k] for k in range(9, 16)]))
+    (tmp_path / "mesh.json").write_text(json.dumps(MESH.tolist()))
+    outside = "".join(f"{x + 900},{y}\n" for x, y in observation.points)
+    (tmp_path / "outside.csv").write_text(f"x,y\n{outside}")
+    warts = "".join(f"wart{k},{k},{k * k}\n" for k in range(8))
+    (tmp_path / "warts.csv").write_text(f"name,x,y\n{warts}")
     lines = pts.read_text().splitlines()
     (tmp_path / "damaged.pts").write_text("\n".join([*lines[:5], "3 x", *lines[6:]]))
     (tmp_path / "cut.pts").write_text("\n".join(lines[:30]))

@@ -207,11 +207,12 @@ BAD: dict[str, tuple[list[str], str]] = {
     "truncated": (["{tmp}/cut.jpg", "--landmarks", "{pts}"], "cut.jpg: damaged or cut off"),
     "not a picture": (["{tmp}/words.jpg", "--landmarks", "{pts}"], "words.jpg: not a picture"),
     "400 million pixels": (["{tmp}/bomb.png", "--landmarks", "{pts}"], "bomb.png: 20000 x 20000 is 400 million"),
-    "one pixel": (["{tmp}/one.png", "--landmarks", "{pts}"], "pixels, one.png has only 1 x 1; give the picture"),
-    "smaller than the points": (["{tmp}/small.png", "--landmarks", "{pts}"], "small.png has only 100 x 80"),
+    "one pixel": (["{tmp}/one.png", "--landmarks", "{pts}"], "pixels, the picture has 1 x 1"),
+    "smaller than the points": (["{tmp}/small.png", "--landmarks", "{pts}"], "pixels, the picture has 220 x 220"),
     "size given twice": (["{photo}", "--landmarks", "{pts}", "--image-size", "9x9"], "--image-size: face.jpg is given"),
+    "another size": (["{tmp}/face.pts", "--image-size", "600x600"], "--image-size: the picture beside face.pts is 500"),
     "nothing beside": (["{pts}"], "points.pts: no picture of the same name beside it"),
-    "face outside": (["{tmp}/large.png", "--landmarks", "{tmp}/far.pts"], "far.pts: none of its points lies in large"),
+    "face outside": (["{tmp}/large.png", "--landmarks", "{tmp}/far.pts"], "far.pts: 0 of 68 points used; 68"),
     "out is a file": (["{photo}", "--landmarks", "{pts}", "--out", "{pts}"], "is a file, not a folder"),
     "no folder for out": (["{photo}", "--landmarks", "{pts}", "--out", "{tmp}/a/b"], "out: there is no folder"),
     "a folder in the way": (["{photo}", "--landmarks", "{pts}", "--out", "{tmp}/way"], "face.glb' is a folder"),
@@ -225,9 +226,11 @@ def test_bad_input_is_one_line_and_writes_nothing(capsys, portrait, tmp_path, na
     (tmp_path / "words.jpg").write_text("hello\n")
     bomb(tmp_path / "bomb.png")
     Image.new("RGB", (1, 1)).save(tmp_path / "one.png")
-    Image.new("RGB", (100, 80)).save(tmp_path / "small.png")
+    Image.new("RGB", (220, 220)).save(tmp_path / "small.png")
     Image.new("RGB", (400, 400)).save(tmp_path / "large.png")
     write_pts(tmp_path / "far.pts", fa.observe(embedded.subject(2), **VIEW).points + 5000)
+    for file in ("face.jpg", "face.pts"):
+        (tmp_path / file).write_bytes((portrait / file).read_bytes())
     (tmp_path / "way" / "face.glb").mkdir(parents=True)
     before = sorted(tmp_path.rglob("*"))
     places = {"{photo}": portrait / "face.jpg", "{tmp}": tmp_path}
@@ -288,6 +291,40 @@ def module(name: str, **names: Any) -> Any:
     made = types.ModuleType(name)
     vars(made).update(names)
     return made
+
+
+def test_contours_of_the_photograph_are_fitted_and_reported(capsys, asked, tmp_path):
+    status, out, err = printed(capsys, *asked, "--contours", "--json")
+    assert (status, err) == (0, "")
+    record = json.loads(out)
+    assert record["contours"]["pairs"] > 50
+    assert record["contours"]["status"] in ("settled", "cycle")
+    alone = json.loads(printed(capsys, *asked[:-2], "--json")[1])
+    assert record["alpha"] != alone["alpha"]
+    assert f"{record['contours']['pairs']} pairs" in (tmp_path / "out" / "face.obj").read_text()
+
+
+def test_a_picture_without_edges_falls_back_to_the_landmarks_and_says_so(
+    capsys, portrait, tmp_path
+):
+    Image.new("RGB", (500, 500), (120, 110, 100)).save(tmp_path / "plain.png")
+    points = portrait / "apart" / "points.pts"
+    asked = ("fit", tmp_path / "plain.png", "--landmarks", points, "--distance", 0.5)
+    status, out, err = printed(capsys, *asked, "--contours")
+    assert (status, err) == (0, "")
+    assert "contours: no contour found; the fit is that of the landmarks alone" in out
+    with_contours = json.loads(printed(capsys, *asked, "--contours", "--json")[1])
+    alone = json.loads(printed(capsys, *asked, "--json")[1])
+    assert with_contours.pop("contours")["pairs"] == 0
+    assert with_contours["alpha"] == pytest.approx(alone["alpha"], abs=1e-9)
+
+
+def test_contours_that_do_not_settle_are_exit_status_one(capsys, asked, monkeypatch):
+    real = fa.contour_fit
+    monkeypatch.setattr(fa, "contour_fit", lambda *a, **o: real(*a, **o, max_iterations=1))
+    status, out, _ = printed(capsys, *asked[:-2], "--contours")
+    assert status == 1
+    assert "contours: iteration limit reached after 1 iterations" in out
 
 
 def test_auto_takes_the_points_that_are_found(capsys, portrait, tmp_path, monkeypatch, embedded):
