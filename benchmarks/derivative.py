@@ -94,7 +94,7 @@ def gauss_newton(work: Stacked, derivative: Callable[[Array, Array], Array]) -> 
     for _ in range(200):
         J = derivative(theta, e)
         H, g = J.T @ J, -(J.T @ e)
-        delta, active, _ = solve_box_qp(H, g, work.low - theta, work.high - theta, active, 200)
+        delta, active, *_ = solve_box_qp(H, g, work.low - theta, work.high - theta, active, 200)
         slope = 2 * float(g @ delta)
         if slope - float(delta @ H @ delta) <= 1e-9 * E:
             break

@@ -169,7 +169,8 @@ def test_the_tangent_is_what_neighbouring_fits_differ_by(seed, distance, box, we
         return  # a coefficient reaches the box just here: no two-sided derivative
     difference = motion(near, far) / (2 * h)
     found = tangent(prepare(MODEL, observation, fit.options).problem, fit.camera, fit.alpha)
-    assert np.linalg.norm(found - difference) < 1e-4 * np.linalg.norm(difference)
+    # Fits stop within 1e-14 of E: 1e-7 of a standard deviation, over 2 h; measured 2e-4 at most
+    assert np.linalg.norm(found - difference) < 1e-3 * np.linalg.norm(difference)
     assert (found[:6][held[1]] == 0).all()
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from itertools import repeat
-from typing import Literal
+from typing import Literal, cast
+
+import numpy as np
 
 from ..model import FaceModel
 from ..observation import Observation
@@ -111,13 +112,14 @@ def fit_batch(
         modes, box, noise_percent, prior_weight, tolerance, max_steps,
         weighting, method, jacobian, als_rounds,
     )  # fmt: skip
+    options.modes_of(model)  # wrong for one, wrong for all
     observations = list(observations)
-    if distance is None or isinstance(distance, (int, float)):
-        kappas: Iterable[float] = repeat(kappa_of(camera, distance), len(observations))
-    elif len(distance) != len(observations):
-        raise ValueError(f"distance: {len(distance)} for {len(observations)} observations")
+    if distance is None or isinstance(distance, str) or np.ndim(distance) == 0:
+        kappas = [kappa_of(camera, cast("float | None", distance))] * len(observations)
     else:
-        kappas = [kappa_of(camera, each) for each in distance]
+        kappas = [kappa_of(camera, each) for each in cast("Sequence[float]", distance)]
+    if len(kappas) != len(observations):
+        raise ValueError(f"distance: {len(kappas)} for {len(observations)} observations")
     free = camera == "perspective" and distance is None
     rows: list[Task | Failure] = []
     starts: list[Start] = []

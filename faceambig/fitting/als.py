@@ -87,9 +87,9 @@ def _step(problem: Problem, point: Point, block: slice) -> tuple[Array, float, f
     delta = np.zeros(len(g))
     H, g, low, high = H[block, block], g[block], low[block], high[block]
     guess = AT_LOW * ((low >= 0) & (g < 0)) + AT_HIGH * ((high <= 0) & (g > 0))
-    delta[block], _, _ = solve_box_qp(H, g, low, high, guess.astype(np.int8), QP_ROUNDS)
-    slope = float(2 * (g @ delta[block]))
-    return delta, slope, slope - float(delta[block] @ (H @ delta[block]))
+    found = solve_box_qp(H, g, low, high, guess.astype(np.int8), QP_ROUNDS)
+    delta[block] = found.d
+    return delta, 2 * found.gd, 2 * found.promised
 
 
 def _at(problem: Problem, point: Point, delta: Array) -> Point:

@@ -14,9 +14,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, whole
 from ..camera import Camera, Seen, View
 from ..rotation import rotation_matrix
+from .boxqp import Pass, passes
 from .result import FitOptions
 from .solve import (
     POSE,
@@ -34,7 +35,9 @@ from .solve import (
 )
 from .task import solve_by
 
-CHUNK = 64  # faces side by side: their J fill 5 MB; fewer cost more calls, more leave the cache (PEERS.md 2)
+CHUNK = 32  # faces side by side: their J fill 3 MB; fewer cost more calls, more leave the cache
+
+ORDER = (First, Pass, Trial, Gradient, Linearised)
 
 
 class Start(NamedTuple):
@@ -56,7 +59,7 @@ def solve_batch(
     progress: Callable[[int], object] | None,
 ) -> list[Answer]:
     """As `solve_by` for every start, in order. `progress` hears how many faces are done since it last heard."""
-    if n_jobs == 0:
+    if whole("n_jobs", n_jobs) == 0:
         raise ValueError("n_jobs: 0 is no number of processes; give 1 or more, or -1 for all cores")
     alike: dict[tuple[int, float, bool], list[int]] = defaultdict(list)
     for row, (problem, _, _) in enumerate(starts):
@@ -107,7 +110,7 @@ def solve_together(starts: Sequence[Start], tolerance: float, max_steps: int) ->
     many = _together([start.problem for start in starts])
     works = [descent(*start, tolerance, max_steps) for start in starts]
     answers: list[Answer] = [ValueError("not solved")] * len(works)
-    asked: dict[type, dict[int, Any]] = {First: {}, Trial: {}, Linearised: {}, Gradient: {}}
+    asked: dict[type, dict[int, Any]] = {kind: {} for kind in ORDER}
 
     def go_on(row: int, said: Any) -> None:
         try:
@@ -120,18 +123,19 @@ def solve_together(starts: Sequence[Start], tolerance: float, max_steps: int) ->
 
     for row in range(len(works)):
         go_on(row, None)
-    while any(asked.values()):
-        for kind, requests in asked.items():
-            if requests:
-                asked[kind] = {}
-                for row, said in zip(requests, _say(many, kind, requests), strict=True):
-                    go_on(row, said)
+    # The small questions first, until all faces are at the large ones: those are answered for all together
+    while kind := next((kind for kind in ORDER if asked[kind]), None):
+        requests, asked[kind] = dict(sorted(asked[kind].items())), {}
+        for row, said in zip(requests, _say(many, kind, requests), strict=True):
+            go_on(row, said)
     return answers
 
 
 def _say(many: Problem, kind: type, requests: dict[int, Any]) -> list[Any]:
     """What each row asked for, all of one kind, in one computation."""
-    part = _rows(many, list(requests))
+    if kind is Pass:
+        return passes(list(requests.values()))
+    part = many if len(requests) == len(many.points) else _rows(many, list(requests))
     if kind is First:
         alpha, views = zip(*requests.values(), strict=True)
         return _points(part, np.stack(alpha), _stacked(views))

@@ -136,7 +136,7 @@ def eliminate(problem: Problem, A: Array, y: Array, active: np.ndarray) -> Elimi
     low[:S], high[:S] = -problem.box, problem.box
     if problem.free_distance:
         low[-1], high[-1] = 1 / NEAREST_KAPPA, FARTHEST_FREE
-    c, active, solved = solve_box_qp(A.T @ A, A.T @ y, low, high, active, QP_ROUNDS)
+    c, active, solved, *_ = solve_box_qp(A.T @ A, A.T @ y, low, high, active, QP_ROUNDS)
     free = active == FREE
     Q, U = np.linalg.qr(A[:, free])
     if solved:
@@ -268,7 +268,7 @@ def _step(H: Array, g: Array, low: float, mu: float) -> tuple[Array, float]:
     """The step (4,) of damping mu that keeps log size above `low`, and the decrease of |d|^2 it promises."""
     bounds = np.array([-np.inf, -np.inf, -np.inf, low]), np.full(4, np.inf)
     damped = H + mu * np.diag(np.diag(H))
-    delta, _, _ = solve_box_qp(damped, g, *bounds, np.zeros(4, dtype=np.int8), QP_ROUNDS)
+    delta = solve_box_qp(damped, g, *bounds, np.zeros(4, dtype=np.int8), QP_ROUNDS).d
     return delta, float(2 * (g @ delta) - delta @ (H @ delta))
 
 

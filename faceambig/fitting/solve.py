@@ -26,7 +26,7 @@ import numpy as np
 from ..arrays import Array
 from ..camera import Camera, Seen, View, fill_jacobian, see
 from ..rotation import rotation_matrix
-from .boxqp import solve_box_qp
+from .boxqp import Pass, box_qp, one_pass
 from .result import Status
 
 POSE = 6  # d (3), t_xy (2), log s
@@ -124,7 +124,7 @@ class Gradient(NamedTuple):
     point: Point
 
 
-Request = First | Trial | Linearised | Gradient
+Request = First | Trial | Linearised | Gradient | Pass
 Descent = Generator[Request, Any, Solution]
 
 
@@ -158,15 +158,16 @@ def descent(
         damped = H + np.diag(mu * np.diag(H)) if mu > 0 else H
         rounds = QP_ROUNDS_EARLY[step - 1] if step <= len(QP_ROUNDS_EARLY) else QP_ROUNDS
         try:
-            delta, active, solved = solve_box_qp(
-                damped, g, lowest - here, highest - here, active, rounds, factors, there=whole
+            delta, active, solved, gd, promised = yield from box_qp(
+                damped, g, lowest - here, highest - here, active, rounds, factors, whole
             )
         except np.linalg.LinAlgError:  # a bad point of the curved valley: damp and try again
             mu, active = max(FIRST_DAMPING, MORE_DAMPING * mu), np.zeros(n, dtype=np.int8)
             keep = whole = False
             continue
-        slope = 2 * float(g @ delta)
-        predicted = slope - float(delta @ (H @ delta))
+        slope, predicted = 2 * gd, 2 * promised
+        if mu > 0:
+            predicted += mu * float(np.diag(H) @ delta**2)  # of the quadratic without damping
         if mu == 0 and solved and predicted <= tolerance * point.cost + rounding:
             if predicted > 0.1 * tolerance * point.cost + rounding:  # the step is known: take it
                 new = yield Trial(point, delta, 1.0)
@@ -281,6 +282,8 @@ def solve(
 
 
 def _answer(problem: Problem, request: Request) -> Any:
+    if isinstance(request, Pass):
+        return one_pass(request)
     if isinstance(request, First):
         return evaluate(problem, request.view, request.alpha)
     if isinstance(request, Trial):
