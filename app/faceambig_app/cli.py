@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from .state import DEFAULT, FIELDS, ViewState, parse
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import faceambig as fa
 
 GOOD, NOT_CONVERGED, BAD_INPUT = 0, 1, 2
@@ -89,6 +91,7 @@ def parser() -> Parser:
     )
     _fit(commands.add_parser("fit", help="fit a face to the points of a photograph"))
     _sweep(commands.add_parser("sweep", help="fit at many distances"))
+    _landmarks(commands.add_parser("landmarks", help="find the points of a face in a photograph"))
     _models(commands.add_parser("models", help="what a model holds: modes, landmark schemes"))
     return root
 
@@ -215,6 +218,23 @@ def _sweep(command: argparse.ArgumentParser) -> None:
         "--steps", type=int, default=13, help="distances, evenly in ratio (default 13)"
     )
     command.set_defaults(run=run_sweep)
+
+
+def _landmarks(command: argparse.ArgumentParser) -> None:
+    command.add_argument("picture", metavar="PHOTO", help="the photograph, with one face or more")
+    command.add_argument(
+        "--out", metavar="FILE.json", help="where to write the points; fit and sweep read them"
+    )
+    command.add_argument(
+        "--overlay", metavar="FILE.png", help="where to write the photograph with the points on it"
+    )
+    command.add_argument(
+        "--jaw",
+        action="store_true",
+        help="keep the jaw (points 1 to 17), which is off by a tenth of the eye distance",
+    )
+    command.add_argument("--json", action="store_true", help="print JSON for programs")
+    command.set_defaults(run=run_landmarks)
 
 
 def _models(command: argparse.ArgumentParser) -> None:
@@ -377,6 +397,79 @@ def run_sweep(options: argparse.Namespace) -> int:
         )
         print(f"landmarks: {notes['landmarks']}")
     return GOOD if all(fit.converged for fit in fits) else NOT_CONVERGED
+
+
+def run_landmarks(options: argparse.Namespace) -> int:
+    """Find the points of the largest face in a photograph; write them, and a picture of them, if asked."""
+    from pathlib import Path
+
+    from faceambig.io.detect import detect_landmarks, draw_detection, write_detection
+    from faceambig.io.pictures import read_picture
+
+    photograph = Path(options.picture)
+    out, overlay = (
+        target(name, value, suffix, photograph)
+        for name, value, suffix in (
+            ("--out", options.out, ".json"),
+            ("--overlay", options.overlay, ".png"),
+        )
+    )
+    picture = read_picture(photograph)
+    found = detect_landmarks(picture.rgb, jaw=options.jaw, name=picture.name)
+    drawn = None if overlay is None else draw_detection(picture.rgb, found)
+    write_detection(found, out, drawn, overlay)
+    files = [str(path) for path in (out, overlay) if path is not None]
+    if options.json:
+        record = {
+            "status": "found",
+            "picture": picture.name,
+            "converted": list(picture.notes),
+            "image_size": list(found.image_size),
+            "scheme": found.scheme,
+            "points": [None if x != x else [x, y] for x, y in found.points.tolist()],
+            "box_px": list(found.box),
+            "score": found.score,
+            "presence_log_odds": found.presence,
+            "n_faces": found.n_faces,
+            "files": files,
+            "version": version(),
+        }
+        print(json.dumps(record))
+        return GOOD
+    for note in picture.notes:
+        print(f"{picture.name}: {note}")
+    left, top, right, bottom = found.box
+    print(
+        f"{picture.name}: a face from ({left:.0f}, {top:.0f}) to ({right:.0f}, {bottom:.0f}), score {found.score:.2f}"
+    )
+    if found.n_faces > 1:
+        print(f"{found.n_faces} faces found; these are the points of the largest")
+    print(
+        "68 points; those of the jaw are off by a tenth of the eye distance"
+        if options.jaw
+        else "51 points; the jaw (1 to 17) is left out, --jaw keeps it"
+    )
+    if files:
+        print(f"written: {', '.join(files)}")
+    return GOOD
+
+
+def target(name: str, value: str | None, suffix: str, photograph: Path) -> Path | None:
+    """The path to write to, if one is asked for; ValueError if that cannot be, before any work."""
+    from pathlib import Path
+
+    if value is None:
+        return None
+    path = Path(value)
+    if path.suffix.lower() != suffix:
+        raise ValueError(f"{name}: {value!r} does not end in {suffix}")
+    if not path.parent.is_dir():
+        raise ValueError(f"{name}: there is no folder {str(path.parent)!r}")
+    if path.is_dir():
+        raise ValueError(f"{name}: {value!r} is a folder, not a file")
+    if path.exists() and photograph.exists() and path.samefile(photograph):
+        raise ValueError(f"{name}: {value!r} is the photograph itself")
+    return path
 
 
 def interval_words(interval: fa.Interval) -> str:

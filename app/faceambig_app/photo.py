@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 import faceambig as fa
+from faceambig.arrays import Array
 from faceambig.io import LandmarkFile
 from faceambig.io.pictures import Picture, is_picture, picture_beside, read_picture
 
@@ -84,7 +83,7 @@ def given(
             f"--image-size: {picture.name} is given, {picture.size[0]} x {picture.size[1]}; leave it out"
         )
     if landmarks is None:
-        points, scheme, words = _found(picture), "ibug68", "found by the networks, without the jaw"
+        scheme, (points, words) = "ibug68", _found(picture)
     else:
         read = fa.load_landmarks(landmarks, image_size=picture.size, model=model)
         points, scheme, words = read.points, read.scheme, _words(read)
@@ -105,15 +104,13 @@ def _beside(file: Path) -> Picture:
     return read_picture(path)
 
 
-def _found(picture: Picture) -> np.ndarray:
-    """(68, 2) points of the face in a picture; NaN for the jaw, whose points the networks cannot see."""
-    try:
-        from faceambig.io.detect import (  # pyright: ignore[reportMissingImports]
-            detect_landmarks,
-        )
-    except ImportError as error:
-        raise RuntimeError("--auto: this version finds no landmarks; use --landmarks") from error
-    return detect_landmarks(picture.rgb).points
+def _found(picture: Picture) -> tuple[Array, str]:
+    """(68, 2) points of the largest face in a picture, NaN for the jaw, which the networks place badly; and words."""
+    from faceambig.io.detect import detect_landmarks
+
+    found = detect_landmarks(picture.rgb, name=picture.name)
+    others = "" if found.n_faces == 1 else f"; the largest of {found.n_faces} faces"
+    return found.points, f"found by the networks, without the jaw{others}"
 
 
 def fitted(model: fa.FaceModel, start: Given, *, contours: bool = False, **options: Any) -> Outcome:

@@ -21,7 +21,7 @@ from faceambig_app import cli, pipeline
 from faceambig_app.state import DEFAULT, FIELDS, ViewState, changed
 from scenes import need_renderer
 
-COMMANDS = ("serve", "snapshot", "fit", "sweep", "models")
+COMMANDS = ("serve", "snapshot", "fit", "sweep", "landmarks", "models")
 
 
 @pytest.fixture(scope="module")
