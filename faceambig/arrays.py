@@ -24,6 +24,21 @@ def read_only(array: NDArray[T]) -> NDArray[T]:
     return view
 
 
+def vertex_normals(vertices: Array, faces: NDArray[np.integer]) -> Array:
+    """(V, 3) unit normals, each triangle weighted by its area; faces (F, 3) wound outward."""
+    corners = vertices[faces]
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    normals = np.empty((len(faces), 3))
+    normals[:, 0] = a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1]
+    normals[:, 1] = a[:, 2] * b[:, 0] - a[:, 0] * b[:, 2]
+    normals[:, 2] = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    at = faces.ravel()
+    sums = np.stack(
+        [np.bincount(at, np.repeat(normals[:, k], 3), len(vertices)) for k in range(3)], axis=1
+    )
+    return sums / np.maximum(np.linalg.norm(sums, axis=1, keepdims=True), 1e-300)
+
+
 def checked(
     name: str, value: ArrayLike, shape: Sequence[int | None], *, nan: bool = False
 ) -> Array:

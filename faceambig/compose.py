@@ -140,6 +140,26 @@ def photo(
     )
 
 
+def photo_of_fit(fit: Fit, size: tuple[int, int], *, draw_from: float = 3.0) -> Photo:
+    """A real photograph of `size` (width, height): its points, and of the face only what was fitted, in clay."""
+    model, camera, observation = fit.model, fit.camera, fit.observation
+    cx, cy = observation.centre
+    return Photo(
+        width=size[0],
+        height=size[1],
+        observed=observation.points,
+        projected=fit.projected(),
+        names=tuple(str(vertex) for vertex in observation.vertices(model)),
+        caption="",
+        vertices=camera_points(camera, fit.vertices(), draw_from),
+        faces=model.faces,
+        colours=np.tile(np.array(CLAY, dtype=np.uint8), (model.n_vertices, 1)),
+        occlusion=model.occlusion,
+        focal=camera.focal if camera.focal is not None else camera.s * draw_from,
+        principal=(float(cx), float(cy)),
+    )
+
+
 def with_fit(picture: Photo, face: Face, *, whole: bool, draw_from: float = 3.0) -> Photo:
     """The photograph with the fitted face's points, and with the fitted face itself if `whole`."""
     if not whole:

@@ -122,8 +122,8 @@ def test_page_and_snapshot_are_importable_by_their_names():
 
     assert snapshot is same
     assert ViewState(subject=3, actual=0.3, distance=1.2).subject == 3
-    with pytest.raises(AttributeError, match="no attribute 'photo'"):
-        _ = faceambig_app.photo
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = faceambig_app.nothing
 
 
 @pytest.mark.parametrize("arguments", [[], ["snapshot"], ["fit"], ["sweep"], ["models"], ["serve"]])

@@ -138,6 +138,10 @@ def _points(command: argparse.ArgumentParser) -> None:
         help="landmarks of the photograph: .pts, CSV with x and y, or JSON; 68 or 51 points of iBUG, "
         "468 or 478 of MediaPipe, or points with names",
     )
+    _options(command)
+
+
+def _options(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--model", default="embedded", help="model name or path (default embedded)"
     )
@@ -164,7 +168,14 @@ def _points(command: argparse.ArgumentParser) -> None:
 
 
 def _fit(command: argparse.ArgumentParser) -> None:
-    _points(command)
+    command.add_argument(
+        "file",
+        metavar="FILE",
+        help="the photograph, with --landmarks or --auto; or its landmarks alone",
+    )
+    command.add_argument("--landmarks", metavar="POINTS", help="landmarks of the photograph")
+    command.add_argument("--auto", action="store_true", help="find the landmarks by itself")
+    _options(command)
     command.add_argument(
         "--distance",
         type=float,
@@ -173,6 +184,14 @@ def _fit(command: argparse.ArgumentParser) -> None:
     )
     command.add_argument(
         "--camera", default="perspective", help="perspective or orthographic (default perspective)"
+    )
+    command.add_argument(
+        "--contours", action="store_true", help="fit the photograph's edges too, as contours"
+    )
+    command.add_argument(
+        "--out",
+        metavar="FOLDER",
+        help="write there: overlay.png, face.obj, .ply and .glb (metres, coloured), fit.json",
     )
     command.set_defaults(run=run_fit)
 
@@ -266,30 +285,58 @@ def state_of(options: argparse.Namespace) -> ViewState:
 
 
 def run_fit(options: argparse.Namespace) -> int:
-    """Fit a face to the points of a file."""
+    """Fit a face to a photograph, or to the points of one; write picture, meshes and numbers if asked."""
+    from pathlib import Path
+
     import faceambig as fa
 
+    from . import photo
+
+    out = None if options.out is None else photo.folder(options.out)  # before the work, not after
     model = fa.load_model(options.model)
-    observation, notes = observation_of(options, model)
-    fit = fa.fit(
-        model, observation, camera=options.camera, distance=options.distance,
+    start = photo.given(
+        Path(options.file), model, landmarks=None if options.landmarks is None else Path(options.landmarks),
+        auto=options.auto, image_size=image_size(options.image_size), pixels=options.contours or out is not None,
+    )  # fmt: skip
+    outcome = photo.fitted(
+        model, start, contours=options.contours, camera=options.camera, distance=options.distance,
         modes=options.modes, box=options.box, noise_percent=options.prior,
     )  # fmt: skip
+    fit, picture = outcome.fit, start.picture
+    notes = notes_of(start.observation, start.image_size_from, start.landmarks)
+    lines = fit_lines(fit, notes)
+    record = fit_record(fit) | notes
+    said: list[str] = []
+    if outcome.contours is not None:
+        record["contours"] = outcome.contours
+        lines.append(photo.contour_words(outcome.contours))
+    if picture is not None:
+        record["picture"] = {"name": picture.name, "converted": list(picture.notes)}
+        said += [f"{picture.name}: {note}" for note in picture.notes]
+        if hint := photo.exif_hint(picture, fit):
+            record["exif"] = hint
+            said.append(photo.hint_words(hint))
+    if out is not None and picture is not None:
+        files = photo.contents(picture, fit, record, lines)
+        photo.write_folder(out, files)
+        record["files"] = [str(out / name) for name in files]
+        said.append(photo.written_words(out, files))
     if options.json:
-        print(json.dumps(fit_record(fit) | notes))
+        print(json.dumps(record))
     else:
-        where = (
-            "far away (orthographic)" if fit.distance is None else f"{100 * fit.distance:.3g} cm"
-        )
-        print(
-            f"{fit.status}: camera at {where}, landmark error d_L {fit.d_l_percent:.2f} % of the interocular distance"
-        )
-        print(f"interocular distance: {fit.interocular_px:.1f} px, {fit.interocular_meaning}")
-        print(
-            f"principal point: {notes['principal_point']}; picture size: {notes['image_size_from']}"
-        )
-        print(f"landmarks: {notes['landmarks']}")
-    return GOOD if fit.converged else NOT_CONVERGED
+        print("\n".join(lines + said))
+    return GOOD if outcome.converged else NOT_CONVERGED
+
+
+def fit_lines(fit: fa.Fit, notes: dict[str, Any]) -> list[str]:
+    """A fit in words."""
+    where = "far away (orthographic)" if fit.distance is None else f"{100 * fit.distance:.3g} cm"
+    return [
+        f"{fit.status}: camera at {where}, landmark error d_L {fit.d_l_percent:.2f} % of the interocular distance",
+        f"interocular distance: {fit.interocular_px:.1f} px, {fit.interocular_meaning}",
+        f"principal point: {notes['principal_point']}; picture size: {notes['image_size_from']}",
+        f"landmarks: {notes['landmarks']}",
+    ]
 
 
 def run_sweep(options: argparse.Namespace) -> int:
@@ -480,14 +527,19 @@ def observation_of(
     size = image_size(options.image_size)
     read = fa.load_landmarks(options.points, image_size=size, model=model)
     observation = fa.Observation(read.points, read.scheme, image_size=read.image_size)
+    words = f"{read.words}; {read.scheme}, {read.unit}"
+    return observation, notes_of(observation, read.image_size_from, words)
+
+
+def notes_of(observation: fa.Observation, image_size_from: str, landmarks: str) -> dict[str, Any]:
+    """What was assumed about a picture."""
     cx, cy = observation.centre
-    notes = {
+    return {
         "points_used": int(observation.visible.sum()),
         "principal_point": f"({cx:g}, {cy:g}), {observation.centre_meaning}",
-        "image_size_from": read.image_size_from,
-        "landmarks": f"{read.words}; {read.scheme}, {read.unit}",
+        "image_size_from": image_size_from,
+        "landmarks": landmarks,
     }
-    return observation, notes
 
 
 def image_size(text: str | None) -> tuple[int, int] | None:

@@ -7,6 +7,8 @@ does not depend on the way the slider took.
 
 from __future__ import annotations
 
+import os
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -249,13 +251,26 @@ def writable(path: Path) -> None:
 def write(path: Path, data: bytes) -> None:
     """The whole file or nothing: beside it first, then in its place. ValueError says why not."""
     writable(path)
-    beside = path.with_name(f".{path.name}.part")
+    write_all({path: data})
+
+
+def write_all(files: Mapping[Path, bytes]) -> None:
+    """All files or none: each beside its place first, and only when all of them are there, in their places.
+
+    ValueError says why not; of a full disk nothing is left.
+    """
+    beside = {path: path.with_name(f".{path.name}.{os.getpid()}.part") for path in files}
+    path = None
     try:
-        beside.write_bytes(data)
-        beside.replace(path)
+        for path, data in files.items():
+            beside[path].write_bytes(data)
+        for path, part in beside.items():
+            part.replace(path)
     except OSError as error:
-        beside.unlink(missing_ok=True)
         raise ValueError(f"out: cannot write {str(path)!r}: {error.strerror}") from error
+    finally:
+        for part in beside.values():
+            part.unlink(missing_ok=True)
 
 
 def _scene(target: Target, shown: Face, look: Look, plot: Curves | None, note: str) -> Scene:

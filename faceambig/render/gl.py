@@ -23,9 +23,8 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Array, IntArray
+from ..arrays import Array, IntArray, vertex_normals
 from ..scene import Head, View
-from .painter import vertex_normals
 
 T = TypeVar("T")
 LIBRARIES = {"osmesa": ("libOSMesa.so.8",), "egl": ("libEGL.so.1", "libGL.so.1")}

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Array
+from ..arrays import Array, vertex_normals
 from ..scene import Photo
 
 SAMPLES = 2  # per pixel and axis
@@ -56,6 +56,23 @@ def paint(
     The triangles are the photo's; `colours` (V, 3) too where none are given.
     """
     width, height = SAMPLES * size[0], SAMPLES * size[1]
+    ramp = np.linspace(0.0, 1.0, height)[:, None]
+    rows = (1.0 - ramp) * BACKGROUND[0] + ramp * BACKGROUND[1]
+    picture = np.repeat((255.0 * rows[:, None]).astype(np.float32), width, axis=1)
+    paint_over(picture, vertices, photo, focal, colours=colours)
+    return cv2.resize(picture, size, interpolation=cv2.INTER_AREA).round().astype(np.uint8)
+
+
+def paint_over(
+    picture: NDArray[np.float32],
+    vertices: Array,
+    photo: Photo,
+    focal: float,
+    *,
+    colours: NDArray[np.uint8] | None = None,
+) -> None:
+    """As `paint`, into `picture` (H, W, 3) of 0 to 255, which shows all of the photo: what lies there stays behind."""
+    height, width = picture.shape[:2]
     depth = np.maximum(vertices[:, 2], NEAREST)
     x = (focal * vertices[:, 0] / depth + photo.principal[0]) * (width / photo.width)
     y = (focal * vertices[:, 1] / depth + photo.principal[1]) * (height / photo.height)
@@ -63,11 +80,7 @@ def paint(
     # Camera axes are turned by half about x: y up and z to the camera, as the lights are given.
     turned = vertices * (1.0, -1.0, -1.0)
     lit = shade(turned, faces, photo.colours if colours is None else colours, photo.occlusion)
-    ramp = np.linspace(0.0, 1.0, height)[:, None]
-    rows = (1.0 - ramp) * BACKGROUND[0] + ramp * BACKGROUND[1]
-    picture = np.repeat((255.0 * rows[:, None]).astype(np.float32), width, axis=1)
     fill(picture, np.stack([x, y, 1.0 / depth], axis=1), faces, lit)
-    return cv2.resize(picture, size, interpolation=cv2.INTER_AREA).round().astype(np.uint8)
 
 
 def shade(
@@ -97,21 +110,6 @@ def shade(
         light = light * open_ ** (0.9, 1.2, 1.25)
         sheen *= open_[:, 0] ** 2
     return 255.0 * np.clip(linear * light + sheen[:, None], 0.0, 1.0) ** (1.0 / 2.2)
-
-
-def vertex_normals(vertices: Array, faces: NDArray[np.integer]) -> Array:
-    """(V, 3) unit normals, each triangle weighted by its area; faces (F, 3) wound outward."""
-    corners = vertices[faces]
-    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    normals = np.empty((len(faces), 3))
-    normals[:, 0] = a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1]
-    normals[:, 1] = a[:, 2] * b[:, 0] - a[:, 0] * b[:, 2]
-    normals[:, 2] = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    at = faces.ravel()
-    sums = np.stack(
-        [np.bincount(at, np.repeat(normals[:, k], 3), len(vertices)) for k in range(3)], axis=1
-    )
-    return sums / np.maximum(np.linalg.norm(sums, axis=1, keepdims=True), 1e-300)
 
 
 class Spans(NamedTuple):

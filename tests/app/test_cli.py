@@ -15,20 +15,13 @@ import numpy as np
 import pytest
 
 import faceambig as fa
+from commands import RECORD, printed, refused, write_pts
 from faceambig.io.schemes import mesh_of_ibug68
 from faceambig_app import cli, pipeline
-from faceambig_app.cli import main
 from faceambig_app.state import DEFAULT, FIELDS, ViewState, changed
 from scenes import need_renderer
 
-Capture = pytest.CaptureFixture[str]
 COMMANDS = ("serve", "snapshot", "fit", "sweep", "landmarks", "models")
-
-
-def write_pts(path: Path, points: np.ndarray) -> Path:
-    rows = "\n".join("nan nan" if np.isnan(x) else f"{x:.6f} {y:.6f}" for x, y in points)
-    path.write_text(f"version: 1\nn_points: {len(points)}\n{{\n{rows}\n}}\n", encoding="utf-8")
-    return path
 
 
 @pytest.fixture(scope="module")
@@ -40,34 +33,6 @@ def observation(embedded: fa.FaceModel) -> fa.Observation:
 def pts(tmp_path: Path, observation: fa.Observation) -> Path:
     """A landmark file as users have it; no picture beside it."""
     return write_pts(tmp_path / "face.pts", observation.points)
-
-
-def printed(capsys: Capture, *arguments: object) -> tuple[int, str, str]:
-    """(status, stdout, stderr) of a command; argparse exits, commands return."""
-    try:
-        status = main([str(argument) for argument in arguments])
-    except SystemExit as left:
-        status = left.code if isinstance(left.code, int) else 1
-    captured = capsys.readouterr()
-    return status, captured.out, captured.err
-
-
-def refused(capsys: Capture, *arguments: object) -> str:
-    """The one line of a refusal."""
-    status, out, err = printed(capsys, *arguments)
-    assert status == 2
-    assert out == ""
-    assert err.endswith("\n")
-    assert err.count("\n") == 1, err
-    assert "Traceback" not in err
-    assert err.startswith("faceambig")
-    assert len(err) < 400
-    return err
-
-
-RECORD = {
-    "status", "camera", "distance_m", "rotation", "translation_m", "alpha", "cost", "d_l_percent", "steps", "version",
-}  # fmt: skip
 
 
 def test_fit_prints_the_record_of_a_program_in_metres_pixels_and_radians(
