@@ -7,8 +7,8 @@ does not depend on the way the slider took.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -19,6 +19,7 @@ import faceambig as fa
 from faceambig.camera import Camera
 from faceambig.compose import Face, compose, compose_row, curves, measure, photo
 from faceambig.flex import FlexibilityModes, plausible_limit
+from faceambig.io.files import replacing
 from faceambig.model import FaceModel, Subject
 from faceambig.observation import portrait_camera
 from faceambig.scene import Curves, Photo, Scene
@@ -259,18 +260,13 @@ def write_all(files: Mapping[Path, bytes]) -> None:
 
     ValueError says why not; of a full disk nothing is left.
     """
-    beside = {path: path.with_name(f".{path.name}.{os.getpid()}.part") for path in files}
     path = None
     try:
-        for path, data in files.items():
-            beside[path].write_bytes(data)
-        for path, part in beside.items():
-            part.replace(path)
+        with ExitStack() as stack:
+            for path, data in files.items():
+                stack.enter_context(replacing(path)).write_bytes(data)
     except OSError as error:
         raise ValueError(f"out: cannot write {str(path)!r}: {error.strerror}") from error
-    finally:
-        for part in beside.values():
-            part.unlink(missing_ok=True)
 
 
 def _scene(target: Target, shown: Face, look: Look, plot: Curves | None, note: str) -> Scene:
