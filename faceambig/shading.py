@@ -124,7 +124,7 @@ def best_light(target: Array, normals: Array, weights: Array) -> tuple[Light, in
     """
     root = np.sqrt(weights)
     found, _, rank, _ = np.linalg.lstsq(root[:, None] * _design(normals), root * target, rcond=RANK)
-    return Light(found), int(rank)
+    return Light(found.astype(np.float64, copy=False)), int(rank)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -239,7 +239,8 @@ def _picture_areas(xy: Array, faces: NDArray[np.integer]) -> Array:
     a, b, c = (xy[corner] for corner in faces.T)
     u, v = b - a, c - a
     area = np.maximum(0.5 * (u[:, 1] * v[:, 0] - u[:, 0] * v[:, 1]), 0.0)
-    return np.bincount(faces.ravel(), np.repeat(area / 3, 3), len(xy))
+    sums = np.bincount(faces.ravel(), np.repeat(area / 3, 3), len(xy))
+    return sums.astype(np.float64, copy=False)
 
 
 def _not_negative(name: str, value: object) -> float:
