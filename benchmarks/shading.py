@@ -103,6 +103,11 @@ def main() -> None:
         return
     for words in works:
         print_tables([row for row in rows if row.faces == words], options.actual)
+    spread = [colour_percent(face, options.actual) for face in embedded.subjects]
+    print(
+        f"\nbrightness of the subjects' colours, sd over the picture: {min(spread):.0f} to {max(spread):.0f} % of its "
+        f"mean, median {np.median(spread):.0f} %"
+    )
 
 
 def drawn(model: fa.FaceModel) -> tuple[fa.Subject, ...]:
@@ -143,6 +148,16 @@ def measured(words: str, faces: Sequence[fa.Subject], actual: float) -> list[Row
     return rows
 
 
+def colour_percent(face: fa.Subject, actual: float) -> float:
+    """Sd of the colours' luminance over what is compared, percent of its mean: brows, lips, a beard's shadow."""
+    assert face.colours is not None
+    fit, camera = fitted(face, actual, actual), portrait_camera(face, distance=actual)
+    weights = fa.explain_shading(fit, face.vertices, camera, LIGHTS["frontal"]).weights
+    brightness = (face.colours / 255.0) ** GAMMA @ [0.2126, 0.7152, 0.0722]
+    mean = np.average(brightness, weights=weights)
+    return 100.0 * float(np.sqrt(np.average((brightness - mean) ** 2, weights=weights)) / mean)
+
+
 def print_tables(rows: Sequence[Row], actual: float) -> None:
     """Medians over faces, by distance and by light; which distance the shading would choose."""
     number = len({row.face for row in rows})
@@ -164,17 +179,24 @@ def print_tables(rows: Sequence[Row], actual: float) -> None:
             f"{100 * median(some, 'kept_fraction'):>5.1f} %     "
             f"{median(some, 'residual'):.3f} sd, {median(some, 'residual_percent'):.1f} % of the mean"
         )
-    print(f"{'explained by light':<21}" + "".join(f"{said(d):>9}" for d in DISTANCES))
-    for name in LIGHTS:
-        cells = [
-            median([r for r in rows if r.light == name and r.fitted == d], "fraction")
-            for d in DISTANCES
-        ]
-        print(f"  {name:<19}" + "".join(f"{100 * cell:>7.1f} %" for cell in cells))
+    for words, column, unit in (
+        ("explained by light", "fraction", 100.0),
+        ("left, % of the mean", "residual_percent", 1.0),
+    ):
+        print(f"{words:<21}" + "".join(f"{said(d):>9}" for d in DISTANCES))
+        for name in LIGHTS:
+            cells = [
+                median([r for r in rows if r.light == name and r.fitted == d], column)
+                for d in DISTANCES
+            ]
+            print(f"  {name:<19}" + "".join(f"{unit * cell:>7.1f} %" for cell in cells))
     for words, column in (("best light", "fraction"), ("kept light", "kept_fraction")):
         chosen = chosen_distances(rows, column)
         shares = ", ".join(f"{said(d)} {100 * share:.0f} %" for d, share in chosen.items())
         print(f"most explained with the {words} at: {shares}")
+    least = {row.face: row for row in sorted(rows, key=lambda row: -row.d_l_percent)}
+    right = sum(row.fitted == actual for row in least.values())
+    print(f"landmark error least at the true distance, without noise: {right} of {number} faces")
 
 
 def chosen_distances(rows: Sequence[Row], column: str) -> Mapping[float | None, float]:

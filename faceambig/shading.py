@@ -154,7 +154,7 @@ class ExplainedShading:
 
     @property
     def kept_residual(self) -> float:
-        """As `residual`, of the known light kept; above 1 it is worse than no shading at all."""
+        """As `residual`, of the known light kept; above 1 it is worse than one even grey."""
         return self._rms(self.target - self.kept) / self.sd
 
     @property
