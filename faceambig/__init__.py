@@ -18,29 +18,34 @@ from .flex import FlexibilityModes, flexibility_modes
 from .io import load_landmarks, load_model
 from .model import FaceModel, Scheme, Subject
 from .observation import Observation, observe
+from .shading import ExplainedShading, Light, explain_shading, shade
 from .sweep import Interval, Sweep, sweep_distance
 
 __all__ = [
     "AssetError",
     "ContourFit",
     "ContourStatus",
+    "ExplainedShading",
     "FaceModel",
     "Failure",
     "Fit",
     "FitOptions",
     "FlexibilityModes",
     "Interval",
+    "Light",
     "Observation",
     "Scheme",
     "Status",
     "Subject",
     "Sweep",
     "contour_fit",
+    "explain_shading",
     "fit",
     "fit_batch",
     "flexibility_modes",
     "load_landmarks",
     "load_model",
     "observe",
+    "shade",
     "sweep_distance",
 ]
