@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from .contours import ContourFit, ContourStatus, contour_fit
 from .errors import AssetError
+from .extremes import ExtremeFace, ExtremeFaces, extreme_faces
 from .fitting import Failure, Fit, FitOptions, Status, fit, fit_batch
 from .flex import FlexibilityModes, flexibility_modes
 from .io import load_landmarks, load_model
@@ -24,6 +25,8 @@ __all__ = [
     "AssetError",
     "ContourFit",
     "ContourStatus",
+    "ExtremeFace",
+    "ExtremeFaces",
     "FaceModel",
     "Failure",
     "Fit",
@@ -36,6 +39,7 @@ __all__ = [
     "Subject",
     "Sweep",
     "contour_fit",
+    "extreme_faces",
     "fit",
     "fit_batch",
     "flexibility_modes",
