@@ -43,8 +43,11 @@ CORRECTIONS = 4  # derivatives taken anew where the face has moved to
 ON_TOLERANCE = 1e-4  # relative: nearer, a face is not corrected any more
 ROUNDING = 1e-12
 EXACT = 1e-6  # of the squared tolerance: how far below it the multiplier may leave the landmarks
-QP_ROUNDS = 300
-RIDGE = 1e-9  # of the mean curvature: what landmarks do not see at all has some
+QP_ROUNDS = 60
+GROWTH = 8.0  # most a pace grows at once: bounds are followed, not guessed
+# Of the mean curvature, step by step: with less, modes that the landmarks hardly see send the first box QP's search of
+# active bounds far astray; a step's answer is the next one's guess. The last changes no face by 0.01 mm
+RIDGES = (1e-2, 1e-3, 1e-4, 1e-5)
 GAP = 1e-4  # relative, of the barrier: how near the bound is to the dual's least value
 NEWTON_STEPS = 300
 
@@ -165,7 +168,7 @@ class Marks(NamedTuple):
 
     r: Array  # (n,), n up to S + 1
     Pi: Array  # (n, S)
-    H: Array  # (S, S) Pi^T Pi, with a little on its diagonal
+    H: Array  # (S, S) Pi^T Pi
     pull: Array  # (S,) Pi^T r
 
     def excess(self, d: Array) -> float:
@@ -219,7 +222,6 @@ class _Photo:
         R = np.linalg.qr(np.column_stack([Pi, r - Pi @ d])).R
         Pi, r = R[:, :S], R[:, S]
         H = Pi.T @ Pi
-        H[np.diag_indices(S)] += RIDGE * np.trace(H) / S
         return Marks(r, Pi, H, Pi.T @ r)
 
 
@@ -233,7 +235,7 @@ def _photo(model: FaceModel, fit: Fit, tolerance: float, free: bool) -> _Photo:
 
 
 def _farthest(
-    marks: Marks, c: Array, low: Array, high: Array, pace: float, active: np.ndarray
+    marks: Marks, H: Array, c: Array, low: Array, high: Array, pace: float, active: np.ndarray
 ) -> tuple[Array, float, np.ndarray]:
     """d of the largest c . d within the box and the tolerance; and its pace and active bounds, for a neighbouring c.
 
@@ -247,9 +249,13 @@ def _farthest(
         return d, pace, np.sign(c).astype(np.int8)
     lowest, highest, best = 0.0, np.inf, np.zeros(len(c))
     for _ in range(60):
-        d, active, *_ = solve_box_qp(marks.H, pace * c - marks.pull, low, high, active, QP_ROUNDS)
+        d, bounds, solved, *_ = solve_box_qp(H, pace * c - marks.pull, low, high, active, QP_ROUNDS)
         gap = marks.r + marks.Pi @ d
         square = float(gap @ gap)
+        if not solved:  # says nothing about larger paces: come nearer to where the bounds are known
+            pace = 0.5 * (lowest + pace)
+            continue
+        active = bounds
         if square <= 1:
             lowest, best = pace, d
             if square >= 1 - EXACT:
@@ -258,17 +264,24 @@ def _farthest(
             highest = pace
         if highest - lowest < 1e-13 * highest:
             break
-        pace = _next_pace(marks, c, active == 0, gap, pace, lowest, highest)
+        pace = _next_pace(marks, H, c, active == 0, gap, pace, lowest, highest)
     return best, lowest or pace, active
 
 
 def _next_pace(
-    marks: Marks, c: Array, free: np.ndarray, gap: Array, pace: float, lowest: float, highest: float
+    marks: Marks,
+    H: Array,
+    c: Array,
+    free: np.ndarray,
+    gap: Array,
+    pace: float,
+    lowest: float,
+    highest: float,
 ) -> float:
     chosen = free.nonzero()[0]
     new = np.nan
     if len(chosen):
-        *_, way, info = lapack.dposv(marks.H[np.ix_(chosen, chosen)], c[chosen], lower=1)
+        *_, way, info = lapack.dposv(H[np.ix_(chosen, chosen)], c[chosen], lower=1)
         if info == 0:
             along = marks.Pi[:, chosen] @ way
             a, b = float(along @ along), float(gap @ along)
@@ -278,7 +291,7 @@ def _next_pace(
                 new = pace + (-b + np.sqrt(root)) / a
     if highest < np.inf:
         return new if lowest < new < highest else 0.5 * (lowest + highest)
-    return float(min(new, 30 * pace)) if new > pace else 10 * pace
+    return float(min(new, GROWTH * pace)) if new > pace else GROWTH * pace
 
 
 def _climb(marks: Marks, G: Array, low: Array, high: Array, c: Array) -> Array:
@@ -287,16 +300,19 @@ def _climb(marks: Marks, G: Array, low: Array, high: Array, c: Array) -> Array:
     if not c.any():
         return d
     unit = c / np.linalg.norm(c)
-    pace = 1 / float(np.sqrt(unit @ np.linalg.solve(marks.H, unit)))  # without a box and r
-    active = np.zeros(len(c), dtype=np.int8)
-    for _ in range(CLIMBS):
-        new, pace, active = _farthest(marks, c, low, high, pace, active)
+    ridges = np.array(RIDGES)[:, None, None] * (np.trace(marks.H) / len(c) * np.eye(len(c)))
+    # without a box and r
+    pace = 1 / float(np.sqrt(unit @ np.linalg.solve(marks.H + ridges[0], unit)))
+    active = (high <= 0).astype(np.int8) - (low >= 0)
+    for step in range(CLIMBS):
+        H = marks.H + ridges[min(step, len(ridges) - 1)]
+        new, pace, active = _farthest(marks, H, c, low, high, pace, active)
         reached = float(new @ G @ new)
         if reached > value:
             d = new
-        if reached <= value * (1 + CLIMB):
+        if reached <= value * (1 + CLIMB) and step >= len(RIDGES) - 1:
             break
-        value, c = reached, G @ d
+        value, c = max(value, reached), G @ d
     return d
 
 
@@ -305,7 +321,7 @@ def _two(marks: Marks, G: Array, low: Array, high: Array, starts: int) -> tuple[
     S = len(G)
     # Towards what moves the surface most for what it moves of the landmarks and takes of the box
     room = np.diag((2 / (high - low)) ** 2) / S
-    _, F = eigh(G, marks.H + room)
+    _, F = eigh(G, marks.H + room)  # room > 0, so never singular
     found = []
     for f in F.T[::-1][: -(-starts // 2)]:
         found += [_climb(marks, G, low, high, sign * (G @ f)) for sign in (1.0, -1.0)]
