@@ -78,7 +78,8 @@ class ExtremeFaces:
     tolerance_percent: float  # rms landmark distance allowed, % of the interocular distance
     pose: Pose
     faces: tuple[ExtremeFace, ExtremeFace]  # the larger change first
-    # No face within the tolerance, landmarks taken as linear in the shape, changes by more: rms mm
+    # rms mm that no face passes if its landmarks are linear in the shape. They are with an orthographic camera and a
+    # fixed pose; else a true face may pass it by a few percent, and stay as much below
     bound_mm: float
     ratio: float  # of the largest change found to bound_mm, both of the linearised problem: 1 is proven best
 
@@ -310,7 +311,7 @@ def _climb(marks: Marks, G: Array, low: Array, high: Array, c: Array) -> Array:
         reached = float(new @ G @ new)
         if reached > value:
             d = new
-        if reached <= value * (1 + CLIMB) and step >= len(RIDGES) - 1:
+        if not d.any() or (reached <= value * (1 + CLIMB) and step >= len(RIDGES) - 1):
             break
         value, c = max(value, reached), G @ d
     return d
