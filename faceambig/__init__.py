@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from .contours import ContourFit, ContourStatus, contour_fit
 from .errors import AssetError
+from .extremes import ExtremeFace, ExtremeFaces, extreme_faces
 from .fitting import Failure, Fit, FitOptions, Status, fit, fit_batch
 from .flex import FlexibilityModes, flexibility_modes
 from .io import load_landmarks, load_model
@@ -25,7 +26,12 @@ __all__ = [
     "AssetError",
     "ContourFit",
     "ContourStatus",
+<<<<<<< HEAD
     "ExplainedShading",
+=======
+    "ExtremeFace",
+    "ExtremeFaces",
+>>>>>>> extreme
     "FaceModel",
     "Failure",
     "Fit",
@@ -39,7 +45,11 @@ __all__ = [
     "Subject",
     "Sweep",
     "contour_fit",
+<<<<<<< HEAD
     "explain_shading",
+=======
+    "extreme_faces",
+>>>>>>> extreme
     "fit",
     "fit_batch",
     "flexibility_modes",
