@@ -14,10 +14,11 @@ from __future__ import annotations
 from .contours import ContourFit, ContourStatus, contour_fit
 from .errors import AssetError
 from .fitting import Failure, Fit, FitOptions, Status, fit, fit_batch
-from .flex import FlexibilityModes, flexibility_modes
+from .flex import FlexibilityModes, KeptModes, flexibility_modes
 from .io import load_landmarks, load_model
 from .model import FaceModel, Scheme, Subject
 from .observation import Observation, observe
+from .spread import PosteriorModes, SurfaceSpread, posterior_modes, surface_spread
 from .sweep import Interval, Sweep, sweep_distance
 
 __all__ = [
@@ -30,10 +31,13 @@ __all__ = [
     "FitOptions",
     "FlexibilityModes",
     "Interval",
+    "KeptModes",
     "Observation",
+    "PosteriorModes",
     "Scheme",
     "Status",
     "Subject",
+    "SurfaceSpread",
     "Sweep",
     "contour_fit",
     "fit",
@@ -42,5 +46,7 @@ __all__ = [
     "load_landmarks",
     "load_model",
     "observe",
+    "posterior_modes",
+    "surface_spread",
     "sweep_distance",
 ]
