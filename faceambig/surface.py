@@ -28,16 +28,21 @@ LANDMARK_GROUPS = {
 
 
 @lru_cache(maxsize=8)
+def _rows(model: FaceModel) -> Array:
+    """Modes (S, 3, E) of the evaluation region: in this order a few directions move it in 0.6 of the time."""
+    return read_only(np.ascontiguousarray(model.rows(_measured(model))[1].transpose(2, 1, 0)))
+
+
 def evaluation_modes(model: FaceModel) -> Array:
-    """Modes (E, 3, S) of the evaluation region, metres per standard deviation."""
-    return read_only(np.ascontiguousarray(model.rows(_measured(model))[1]))
+    """Modes (E, 3, S) of the evaluation region, metres per standard deviation; a view of (S, 3, E)."""
+    return _rows(model).transpose(2, 1, 0)
 
 
 @lru_cache(maxsize=8)
 def gram(model: FaceModel) -> Array:
     """G = Q^T Q (S, S) over the evaluation region, m^2."""
-    Q = evaluation_modes(model).reshape(-1, model.n_modes)
-    return read_only(Q.T @ Q)
+    Q = _rows(model).reshape(model.n_modes, -1)
+    return read_only(Q @ Q.T)
 
 
 @lru_cache(maxsize=16)
@@ -71,19 +76,22 @@ class Bending:
     motion: Array  # (6, S) the rigid motion in each coefficient: tau (3,), omega (3,)
 
     def moved(self, F: Array) -> Array:
-        """(E, 3, K) metres: movement of the measured surface along the columns of F (S, K)."""
-        # The view of the first S columns: a copy of them costs more than the product
-        Q = evaluation_modes(self.model).reshape(-1, self.model.n_modes)[:, : len(F)]
-        moved = (Q @ F).reshape(-1, 3, F.shape[1])
+        """(K, 3, E) metres: movement of the measured surface along the columns of F (S, K)."""
+        S, K = F.shape
+        moved = F.T @ _rows(self.model)[:S].reshape(S, -1)
         if self.face is not None:
-            moved -= rigid_field(self.face[_measured(self.model)] - self.centre) @ (self.motion @ F)
-        return moved
+            field = rigid_field(self.face[_measured(self.model)] - self.centre)
+            moved -= (self.motion @ F).T @ field.reshape(6, -1)
+        return moved.reshape(K, 3, -1)
 
     def mean_change(self, F: Array) -> Array:
         """(K,) metres: mean movement of the measured surface along each column of F (S, K)."""
         moved = self.moved(F)
-        np.square(moved, out=moved)
-        return np.sqrt(moved[:, 0] + moved[:, 1] + moved[:, 2]).mean(axis=0)
+        np.multiply(moved, moved, out=moved)
+        squares = moved[:, 0]
+        squares += moved[:, 1]
+        squares += moved[:, 2]
+        return np.sqrt(squares, out=squares).mean(axis=1)
 
     def parts(self, F: Array) -> dict[str, Array]:
         """Mean movement (4, K) of each named part, in the order of DIRECTIONS, metres."""
@@ -103,27 +111,24 @@ def bending(model: FaceModel, alpha: Array, *, aligned: bool) -> Bending:
     G = gram(model)[:S, :S]
     if not aligned:
         return Bending(model, G, _whitening(model, S), None, np.zeros(3), np.zeros((6, S)))
-    face, Q = model.vertices(alpha), evaluation_modes(model)
+    face = model.vertices(alpha)
     measured = face[_measured(model)]
     centre = measured.mean(axis=0)
-    v = measured - centre
-    tau = Q.mean(axis=0)[:, :S]
-    # sum_i v_i (x) Q_i first: v_i x Q_i of all modes would be an array of the model's size
-    M = (v.T @ Q.reshape(len(Q), -1)).reshape(3, 3, -1)[:, :, :S]
-    torque = np.stack([M[1, 2] - M[2, 1], M[2, 0] - M[0, 2], M[0, 1] - M[1, 0]])
-    omega = np.linalg.solve(np.vdot(v, v) * np.eye(3) - v.T @ v, torque)
-    G = G - len(v) * (tau.T @ tau) - torque.T @ omega
-    return Bending(model, G, whitening(G), face, centre, np.concatenate([tau, omega]))
+    field = rigid_field(measured - centre).reshape(6, -1)
+    pull = _rows(model)[:S].reshape(S, -1) @ field.T
+    motion = np.linalg.solve(field @ field.T, pull.T)
+    G = G - pull @ motion
+    return Bending(model, G, whitening(G), face, centre, motion)
 
 
 def rigid_field(v: Array) -> Array:
-    """(n, 3, 6) movement of points v (n, 3) by tau (3,) and omega (3,): tau + omega x v."""
+    """(6, 3, n) movement of points v (n, 3) by each of tau (3,) and omega (3,): tau + omega x v."""
     x, y, z = v.T
-    field = np.zeros((len(v), 3, 6))
-    field[:, [0, 1, 2], [0, 1, 2]] = 1.0
-    field[:, 1, 3], field[:, 2, 3] = -z, y
-    field[:, 0, 4], field[:, 2, 4] = z, -x
-    field[:, 0, 5], field[:, 1, 5] = -y, x
+    field = np.zeros((6, 3, len(v)))
+    field[[0, 1, 2], [0, 1, 2]] = 1.0
+    field[3, 1], field[3, 2] = -z, y
+    field[4, 0], field[4, 2] = z, -x
+    field[5, 0], field[5, 1] = -y, x
     return field
 
 
@@ -151,14 +156,16 @@ def _parts(model: FaceModel) -> tuple[tuple[str, np.ndarray, Array, Array], ...]
     for name, vertices in (parts or {"face": every}).items():
         mean, modes = model.rows(vertices)
         outward = np.sign(mean[:, 0])  # +1 left, -1 right
-        answer.append((name, vertices, outward, read_only(_means(outward, modes))))
+        answer.append(
+            (name, vertices, outward, read_only(_means(outward, modes.transpose(2, 1, 0))))
+        )
     return tuple(answer)
 
 
 def _means(outward: Array, movements: Array) -> Array:
-    """(4, k) means of movements (n, 3, k) in the order of DIRECTIONS."""
-    x, y, z = movements.mean(axis=0)
-    return np.stack([outward @ movements[:, 0] / len(outward), y, z, x])
+    """(4, k) means of movements (k, 3, n) in the order of DIRECTIONS."""
+    x, y, z = movements.mean(axis=2).T
+    return np.stack([movements[:, 0] @ outward / len(outward), y, z, x])
 
 
 def sign(f: Array, mean_change: float, moves: dict[str, Array], k: int) -> float:
