@@ -6,8 +6,8 @@ what is invisible is ordered by a second problem, the most surface change for th
 
 Pi is the Jacobian of the landmarks by alpha at the fit, in pixels: of the reprojection, or of the paper's DLT rows
 f X - x Z, f Y - y Z over t_z (its Pi_persp, where x is what was observed; MATH.md 2, E10). Under an orthographic camera
-they are one. With the pose compensated Pi becomes (I - J_p J_p^+) Pi, J_p the Jacobian by the pose: the camera follows
-the bend, and the surface change is taken after rigid alignment, in Q^T Q as in millimetres.
+held at its distance they are one. With the pose compensated Pi becomes (I - J_p J_p^+) Pi, J_p the Jacobian by the
+pose: the camera follows the bend, and surface change is what rigid alignment leaves, in G as in millimetres.
 """
 
 from __future__ import annotations
