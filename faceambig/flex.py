@@ -13,7 +13,7 @@ pose: the camera follows the bend, and surface change is what rigid alignment le
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, get_args
+from typing import Literal, NamedTuple, cast, get_args
 
 import numpy as np
 from scipy.linalg import qr, solve_triangular
@@ -362,7 +362,8 @@ def without_pose(rows: Linear, columns: int) -> PoseFree:
         return PoseFree(Pi, steps)
     unit = np.linalg.norm(J_p, axis=0)
     unit[unit == 0] = 1.0
-    Q, U, pivots = qr(J_p / unit, mode="economic", pivoting=True, check_finite=False)
+    decomposed = qr(J_p / unit, mode="economic", pivoting=True, check_finite=False)
+    Q, U, pivots = cast("tuple[Array, Array, IntArray]", decomposed)
     rank = int((np.abs(np.diag(U)) > SAME_MOTION * abs(U[0, 0])).sum())
     Q, U, pivots = Q[:, :rank], U[:rank, :rank], pivots[:rank]
     along = Q.T @ Pi

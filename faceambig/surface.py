@@ -116,7 +116,7 @@ def bending(model: FaceModel, alpha: Array, *, aligned: bool) -> Bending:
     centre = measured.mean(axis=0)
     field = rigid_field(measured - centre).reshape(6, -1)
     pull = _rows(model)[:S].reshape(S, -1) @ field.T
-    motion = np.linalg.solve(field @ field.T, pull.T)
+    motion = np.asarray(np.linalg.solve(field @ field.T, pull.T), dtype=np.float64)
     G = G - pull @ motion
     return Bending(model, G, whitening(G), face, centre, motion)
 

@@ -176,6 +176,9 @@ def test_the_first_mode_is_what_a_search_under_the_constraint_finds(
     if columns:
         residual -= J[:, S:] @ np.linalg.lstsq(J[:, S:], residual, rcond=None)[0]
     bound = reached / (residual @ residual)
+    one_pixel: Any = {
+        "type": "eq", "fun": lambda x: x @ H @ x - 1, "jac": lambda x: 2 * H @ x,
+    }  # fmt: skip
     found = []
     for start in np.random.default_rng(5).standard_normal((3, S + columns)):
         x = start / np.sqrt(start @ H @ start)
@@ -183,12 +186,10 @@ def test_the_first_mode_is_what_a_search_under_the_constraint_finds(
             lambda x: -(x @ G @ x) / bound,
             x,
             jac=lambda x: -2 * G @ x / bound,
-            constraints={
-                "type": "eq", "fun": lambda x: x @ H @ x - 1, "jac": lambda x: 2 * H @ x,
-            },
+            constraints=one_pixel,
             method="SLSQP",
             options={"maxiter": 500, "ftol": 1e-12},
-        )  # fmt: skip
+        )
         found.append((done.x @ G @ done.x) / (done.x @ H @ done.x) / bound)
     # differences of step 1e-4 are right to 1e-8; of three starts one at least climbs to the top
     assert max(found) == pytest.approx(1.0, abs=1e-6)
@@ -264,11 +265,13 @@ def test_beside_a_following_camera_the_first_order_leaves_a_square(embedded, cam
     observation = fa.observe(embedded.subject(2), distance=0.3, yaw_deg=15)
     fit = fa.fit(embedded, observation, camera=camera, distance=distance)
     modes = fa.flexibility_modes(embedded, fit, count=3, **how)
+    assert modes.camera_steps is not None
     vertices, still = fit.observation.vertices(embedded), picture(fit, fit.alpha)
-    for k, f in enumerate(modes.directions):
+    assert modes.camera_steps is not None
+    for follow, f in zip(modes.camera_steps, modes.directions, strict=True):
 
-        def moved(w, k=k, f=f):
-            step = w * modes.camera_steps[k]
+        def moved(w, follow=follow, f=f):
+            step = w * follow
             points = embedded.vertices(fit.alpha + w * f)[vertices]
             return project(steered(fit.camera, step), points) - still
 
@@ -285,6 +288,7 @@ def test_the_camera_of_a_bend_is_the_step_taken(embedded):
     assert held.camera(0, 5.0) is fit.camera
     for free in (False, True):
         modes = fa.flexibility_modes(embedded, fit, 2, pose="compensated", free_distance=free)
+        assert modes.camera_steps is not None
         camera, expected = modes.camera(1, 3.0), steered(fit.camera, 3.0 * modes.camera_steps[1])
         for name in ("R", "t", "s", "kappa"):
             assert np.array_equal(getattr(camera, name), getattr(expected, name))
@@ -294,7 +298,8 @@ def test_the_camera_of_a_bend_is_the_step_taken(embedded):
     kappas = sorted(modes.camera(0, w).kappa for w in (-1.0, 1.0))
     assert kappas[0] == 0.0  # beyond infinity there is no camera
     assert kappas[1] > 0.0
-    for wrong, said in ((np.nan, "mm: nan is not"), ("2", "mm: '2' is not a number")):
+    wrongs: list[tuple[Any, str]] = [(np.nan, "mm: nan is not"), ("2", "mm: '2' is not a number")]
+    for wrong, said in wrongs:
         with pytest.raises(ValueError, match=said):
             modes.camera(0, wrong)
 
