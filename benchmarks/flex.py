@@ -1,4 +1,4 @@
-"""What the modes of a fit cost, and what they find: `python benchmarks/flex.py [--json] [--check]`.
+"""What the modes of a fit cost: `python benchmarks/flex.py [--json] [--check]`.
 
 Milliseconds of CPU of one thread, medians over random photographs with every mode of the model; the Gram matrix is at
 hand, as after the first fit. ICT-FaceKit if FACEAMBIG_ICT names its folder, else the embedded head. --check fails

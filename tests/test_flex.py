@@ -400,6 +400,15 @@ def test_what_is_kept_is_what_moves_the_points_less_than_that(embedded):
         kept.kept[0] = 1
 
 
+@pytest.mark.parametrize("sign_of_f", [-1, 1])
+def test_a_face_is_plausible_on_both_sides_or_not_at_all(sign_of_f):
+    fit = replace(fitted(), alpha=3 * np.eye(S)[0])
+    modes = FlexibilityModes(fit, sign_of_f * np.eye(S), np.full(S, 1e-3), ("",) * S)
+    kept = modes.truncated(2.0)
+    assert 3.7 < plausible_limit(S) < 5  # 3 + 2 of the first coefficient is too much, |(3, 2)| not
+    assert (kept.plausible, kept.plausible_upper, kept.plausible_faces) == (S, S, S - 1)
+
+
 def test_plausible_range_lies_three_deviations_about_the_mean_of_chi():
     low, high = plausible_range(70)
     assert (low, high) == pytest.approx((6.22, 10.45), abs=0.01)  # MATH.md 4
