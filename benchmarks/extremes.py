@@ -67,7 +67,8 @@ def main() -> int:
         for row in rows:
             print(
                 f"{row.subject:>7}  {row.pose:<5}  {row.pixels:>2}  {row.change_mm[0]:>6.2f}  {row.change_mm[1]:>6.2f}"
-                f"  {row.d_s_mm[0]:>6.2f} {row.d_s_mm[1]:>6.2f}  {row.bound_mm:>6.2f}  {row.share:.3f}  {row.seconds:>7.2f}"
+                f"  {row.d_s_mm[0]:>6.2f} {row.d_s_mm[1]:>6.2f}  {row.bound_mm:>6.2f}"
+                f"  {row.share:.3f}  {row.seconds:>7.2f}"
             )
         print(
             f"share: median {share:.3f} (wanted {PROMISED_SHARE}), least {min(row.share for row in rows):.3f}; "

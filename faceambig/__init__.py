@@ -15,47 +15,47 @@ from .contours import ContourFit, ContourStatus, contour_fit
 from .errors import AssetError
 from .extremes import ExtremeFace, ExtremeFaces, extreme_faces
 from .fitting import Failure, Fit, FitOptions, Status, fit, fit_batch
-from .flex import FlexibilityModes, flexibility_modes
+from .flex import FlexibilityModes, KeptModes, flexibility_modes
 from .io import load_landmarks, load_model
 from .model import FaceModel, Scheme, Subject
 from .observation import Observation, observe
 from .shading import ExplainedShading, Light, explain_shading, shade
+from .spread import PosteriorModes, SurfaceSpread, posterior_modes, surface_spread
 from .sweep import Interval, Sweep, sweep_distance
 
 __all__ = [
     "AssetError",
     "ContourFit",
     "ContourStatus",
-<<<<<<< HEAD
     "ExplainedShading",
-=======
     "ExtremeFace",
     "ExtremeFaces",
->>>>>>> extreme
     "FaceModel",
     "Failure",
     "Fit",
     "FitOptions",
     "FlexibilityModes",
     "Interval",
+    "KeptModes",
     "Light",
     "Observation",
+    "PosteriorModes",
     "Scheme",
     "Status",
     "Subject",
+    "SurfaceSpread",
     "Sweep",
     "contour_fit",
-<<<<<<< HEAD
     "explain_shading",
-=======
     "extreme_faces",
->>>>>>> extreme
     "fit",
     "fit_batch",
     "flexibility_modes",
     "load_landmarks",
     "load_model",
     "observe",
+    "posterior_modes",
     "shade",
+    "surface_spread",
     "sweep_distance",
 ]

@@ -1,26 +1,58 @@
 """Flexibility modes: how far the face may bend while its landmarks hardly move (paper, section 4.4; MATH.md 4).
 
 max |Q f|^2 subject to |Pi f|^2 = c gives Q^T Q f = lambda Pi^T Pi f. Pi^T Pi may be singular (2 L < S), G = Q^T Q never
-is, so the reversed problem Pi^T Pi f = mu G f is solved: mu ascending is flexibility descending, mu = 0 is invisible.
-Pi is the Jacobian of the reprojection by alpha at the fit, pose fixed: at any distance, in pixels.
+is, so the reversed problem Pi^T Pi f = mu G f is solved: mu ascending is flexibility descending. mu = 0 is invisible;
+what is invisible is ordered by a second problem, the most surface change for the least |f| first.
+
+Pi is the Jacobian of the landmarks by alpha at the fit, in pixels: of the reprojection, or of the paper's DLT rows
+f X - x Z, f Y - y Z over t_z (its Pi_persp, where x is what was observed; MATH.md 2, E10). Under an orthographic camera
+held at its distance they are one. With the pose compensated Pi becomes (I - J_p J_p^+) Pi, J_p the Jacobian by the
+pose: the camera follows the bend, and surface change is what rigid alignment leaves, in G as in millimetres.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from typing import Literal, NamedTuple, cast, get_args
 
 import numpy as np
-from scipy.linalg import eigh
+from scipy.linalg import qr, solve_triangular
 from scipy.special import gammaln
 
-from .arrays import Array, read_only, shown, whole
-from .camera import jacobian
+from .arrays import Array, IntArray, number, read_only, shown, whole
+from .camera import Camera, jacobian
 from .fitting import Fit
-from .fitting.task import landmark_rows
+from .fitting.task import MANY, landmark_rows
 from .model import FaceModel
+from .rotation import rotation_matrix
+from .surface import DIRECTIONS, Bending, bending, evaluation_modes, gram, sign, words
 
-DIRECTIONS = (("wider", "narrower"), ("up", "down"), ("forward", "back"))
+__all__ = [
+    "DIRECTIONS", "FlexibilityModes", "KeptModes", "evaluation_modes", "flexibility_modes", "gram", "plausible_limit",
+]  # fmt: skip
+
+Linearisation = Literal["reprojection", "algebraic"]
+Pose = Literal["fixed", "compensated"]
+INVISIBLE = 1e-12  # of the largest mu: below, mu is rounding
+SAME_MOTION = 1e-9  # of a pose column: what is left of it beside the others is rounding
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class KeptModes:
+    """The modes that a truncation keeps, and how many of them give plausible faces."""
+
+    surface_mm: float  # k_1, mean surface change that each mode is moved by
+    landmark_px: float  # k_2, mean landmark movement that is still allowed
+    kept: IntArray  # (M,) numbers of the modes kept, 0-based, ascending
+    plausible: int  # |w f| is that of a face: within 3 sd of the mean of chi (the paper's count)
+    plausible_upper: int  # |w f| is not above it: an offset may be small
+    plausible_faces: int  # |alpha + w f| and |alpha - w f| of the fitted face are not above it
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "kept", read_only(self.kept))
+
+    def __len__(self) -> int:
+        return len(self.kept)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,131 +63,351 @@ class FlexibilityModes:
     directions: Array  # (K, S) change of alpha per millimetre of mean surface change
     landmark_percent: Array  # (K,) mean landmark movement per millimetre, % of the interocular distance, first order
     words: tuple[str, ...]  # K descriptions of what the positive direction moves
+    linearisation: Linearisation = "reprojection"
+    pose: Pose = "fixed"
+    # (K, 7) how the compensating camera follows, per millimetre: turn (radians), t_xy (metres), log s, kappa.
+    # None: it stays
+    camera_steps: Array | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "directions", read_only(self.directions))
-        object.__setattr__(self, "landmark_percent", read_only(self.landmark_percent))
+        for name in ("directions", "landmark_percent", "camera_steps"):
+            array = getattr(self, name)
+            if array is not None:
+                object.__setattr__(self, name, read_only(array))
 
     def reach(self, mode: int) -> tuple[float, float]:
         """(lowest, highest) millimetres along mode (0-based) that still give a plausible face: |alpha + w f| <= limit.
 
         Empty, (0, 0), where the fitted face itself is beyond the limit.
         """
-        if not 0 <= whole("mode", mode) < len(self.directions):
-            raise ValueError(f"mode: {shown(mode)} is not within 0 to {len(self.directions) - 1}")
-        f, alpha = self.directions[mode], self.fit.alpha
+        f, alpha = self.directions[self._number(mode)], self.fit.alpha
         a, b, c = f @ f, alpha @ f, alpha @ alpha - plausible_limit(len(alpha)) ** 2
         if c > 0:
             return 0.0, 0.0
         root = float(np.sqrt(b * b - a * c))
         return float(-b - root) / float(a), float(-b + root) / float(a)
 
+    def camera(self, mode: int, mm: float) -> Camera:
+        """The camera that sees the fit bent by `mm` along mode (0-based): the fit's own unless the pose compensates."""
+        mode, mm = self._number(mode), number("mm", mm)
+        camera = self.fit.camera
+        if self.camera_steps is None:
+            return camera
+        if not np.isfinite(mm):
+            raise ValueError(f"mm: {mm} is not a number of millimetres")
+        step = mm * self.camera_steps[mode]
+        return Camera(
+            rotation_matrix(step[:3]) @ camera.R,
+            camera.t + step[3:5],
+            camera.s * float(np.exp(step[5])),
+            max(camera.kappa + float(step[6]), 0.0),
+        )
+
+    def truncated(
+        self,
+        surface_mm: float = 2.0,
+        *,
+        landmark_px: float | None = None,
+        landmark_percent: float | None = None,
+    ) -> KeptModes:
+        """The modes that change the surface by k_1 = `surface_mm` and the landmarks by less than k_2, means of both.
+
+        Parameters
+        ----------
+        landmark_px: k_2 in pixels, of this picture: twice the size keeps fewer. None and no percent: 2, the paper's.
+        landmark_percent: k_2 in percent of the interocular distance instead.
+
+        Raises
+        ------
+        ValueError: k_1 or k_2 is not positive, both k_2 are given, or only some of the modes are known.
+        """
+        fit, S = self.fit, len(self.fit.alpha)
+        if len(self.directions) < S:
+            raise ValueError(
+                f"count: {len(self.directions)} of {S} modes are known, truncation looks at all; "
+                "ask flexibility_modes for count=None"
+            )
+        k_1 = positive("surface_mm", surface_mm)
+        if landmark_percent is None:
+            k_2 = positive("landmark_px", 2.0 if landmark_px is None else landmark_px)
+        elif landmark_px is None:
+            k_2 = positive("landmark_percent", landmark_percent) * fit.interocular_px / 100
+        else:
+            raise ValueError("landmark_percent: given beside landmark_px; give one of them")
+        moved_px = k_1 * self.landmark_percent * fit.interocular_px / 100
+        kept = np.flatnonzero(moved_px < k_2)
+        wf = k_1 * self.directions[kept]
+        low, high = plausible_range(S)
+        size = np.linalg.norm(wf, axis=1)
+        faces = np.maximum(
+            np.linalg.norm(fit.alpha + wf, axis=1), np.linalg.norm(fit.alpha - wf, axis=1)
+        )
+        return KeptModes(
+            surface_mm=k_1,
+            landmark_px=k_2,
+            kept=kept,
+            plausible=int(((low <= size) & (size <= high)).sum()),
+            plausible_upper=int((size <= high).sum()),
+            plausible_faces=int((faces <= high).sum()),
+        )
+
+    def _number(self, mode: int) -> int:
+        if not 0 <= whole("mode", mode) < len(self.directions):
+            raise ValueError(f"mode: {shown(mode)} is not within 0 to {len(self.directions) - 1}")
+        return int(mode)
+
+
+def plausible_range(n_modes: int) -> tuple[float, float]:
+    """Least and largest |alpha| of a plausible face: mean -+ 3 sd of chi with S = n_modes (paper, section 6.4)."""
+    mean = np.sqrt(2.0) * np.exp(gammaln((n_modes + 1) / 2) - gammaln(n_modes / 2))
+    sd = np.sqrt(n_modes - mean**2)
+    return float(mean - 3.0 * sd), float(mean + 3.0 * sd)
+
 
 def plausible_limit(n_modes: int) -> float:
     """Largest |alpha| of a plausible face: mean + 3 sd of chi with S = n_modes (paper, section 6.4)."""
-    mean = np.sqrt(2.0) * np.exp(gammaln((n_modes + 1) / 2) - gammaln(n_modes / 2))
-    return float(mean + 3.0 * np.sqrt(n_modes - mean**2))
+    return plausible_range(n_modes)[1]
 
 
-def flexibility_modes(model: FaceModel, fit: Fit, count: int = 3) -> FlexibilityModes:
-    """The `count` most flexible modes at a fit, each scaled to 1 mm of mean surface change.
+def flexibility_modes(
+    model: FaceModel,
+    fit: Fit,
+    count: int | None = 3,
+    *,
+    linearisation: Linearisation = "reprojection",
+    pose: Pose = "fixed",
+    free_distance: bool = False,
+    previous: FlexibilityModes | None = None,
+) -> FlexibilityModes:
+    """The `count` most flexible modes at a fit, each scaled to 1 mm of mean surface change (MATH.md 4).
 
     The surface is the model's evaluation region, the one d_S is measured on. The sign makes the part that moves most
-    along z move forward.
+    along z move forward. The problem knows no prior: |alpha| beside a bend says whether it is still a face.
+
+    Parameters
+    ----------
+    count: modes asked for; None: all S, as a truncation needs. Each costs its millimetres, 0.3 ms for 9,400 vertices.
+    linearisation: of the landmarks, see the module; "algebraic" is the paper's, and less exact below 0.6 m.
+        `landmark_percent` is of the reprojection either way.
+    pose: "fixed"; or "compensated", where the camera turns, shifts and scales with the bend (6 parameters) so that the
+        landmarks stay, and surface change is what rigid alignment leaves.
+    free_distance: the compensating camera changes its distance too (7 parameters).
+    previous: modes of a fit nearby: mode i is then the one that continues its mode i, in its sign, whatever its place
+        by flexibility; further ones follow in their own order.
+
+    Raises
+    ------
+    ValueError: no fit or one that did not converge, a model of another mesh, an argument out of range.
     """
+    check_fit(model, fit)
+    count = count_of(fit, count)
+    one_of("linearisation", linearisation, get_args(Linearisation))
+    columns = pose_columns(pose, get_args(Pose), free_distance)
+    picture = linearised(model, fit)
+    rows = picture if linearisation == "reprojection" else algebraic(model, fit)
+    surface = bending(model, fit.alpha, aligned=pose == "compensated")
+    F = most_flexible(without_pose(rows, columns).shape, surface.W)
+    signs = None
+    if previous is not None:
+        if not isinstance(previous, FlexibilityModes):
+            raise ValueError(f"previous: {shown(previous)} is not a FlexibilityModes")
+        order, signs = continued(previous.directions, F, surface.G, count)
+        F = F[:, order]
+    F = F[:, :count]
+    return _scaled(fit, F, signs, surface, without_pose(picture, columns), linearisation, pose)
+
+
+def _scaled(
+    fit: Fit,
+    F: Array,
+    signs: Array | None,
+    surface: Bending,
+    picture: PoseFree,
+    linearisation: Linearisation,
+    pose: Pose,
+) -> FlexibilityModes:
+    """Directions F (S, K) in millimetres, with sign and words. `signs` (P,) are those of the first P, if known."""
+    mean = surface.mean_change(F)
+    F = F / (1e3 * mean)
+    moves = surface.parts(F)
+    turned = np.array([sign(f, 1e-3, moves, k) for k, f in enumerate(F.T)])
+    if signs is not None:
+        turned[: len(signs)] = signs
+    F = F * turned
+    movement = (picture.shape @ F).reshape(-1, 2, F.shape[1])
+    return FlexibilityModes(
+        fit,
+        np.ascontiguousarray(F.T),
+        100 * np.linalg.norm(movement, axis=1).mean(axis=0) / fit.interocular_px,
+        tuple(words(moves, k, s) for k, s in enumerate(turned)),
+        linearisation,
+        pose,
+        None if pose == "fixed" else np.ascontiguousarray((picture.steps @ F).T),
+    )
+
+
+def check_fit(model: FaceModel, fit: Fit) -> None:
+    """ValueError unless `fit` is a converged fit of a model with this mesh and these modes."""
     if not isinstance(model, FaceModel):
         raise ValueError(f"model: {shown(model)} is not a FaceModel; load one with load_model")
     if not isinstance(fit, Fit):
-        raise ValueError(f"fit: {shown(fit)} is not a Fit")
-    S = len(fit.alpha)
-    if model.n_vertices != fit.model.n_vertices or model.n_modes < S:
+        raise ValueError(f"fit: {shown(fit)} is not a Fit; make one with faceambig.fit")
+    if not fit.converged:
+        raise ValueError(
+            f"fit: it did not converge ({fit.status.value}), so its neighbourhood means nothing; "
+            "fit again with more max_steps, or with method='joint'"
+        )
+    if model.n_vertices != fit.model.n_vertices or model.n_modes < len(fit.alpha):
         raise ValueError(
             f"model: {model.n_vertices} vertices, {model.n_modes} modes; "
             f"the fit is of one with {fit.model.n_vertices} and {fit.model.n_modes}"
         )
+
+
+def count_of(fit: Fit, count: int | None) -> int:
+    """`count`, or all S modes for None; ValueError out of range."""
+    S = len(fit.alpha)
+    if count is None:
+        return S
     if not 1 <= whole("count", count) <= S:
         raise ValueError(f"count: {shown(count)} is not within 1 to {S}")
-    visible = fit.observation.visible
-    vertices = fit.observation.vertices(model)[visible]
-    mean, _, modes = landmark_rows(model, tuple(vertices.tolist()), model.n_modes)
-    modes = np.ascontiguousarray(modes[:, :, :S])
-    Pi = jacobian(fit.camera, mean + modes @ fit.alpha, modes)[:, :, :S]
-    flat = Pi.reshape(-1, S)
-    G = gram(model)[:S, :S]
-    _, F = eigh(flat.T @ flat, G, subset_by_index=[0, count - 1])
-    directions, words = [], []
-    for f in F.T:
-        moved = evaluation_modes(model)[:, :, :S] @ f  # (E, 3) metres
-        f_mm = f / (1e3 * np.linalg.norm(moved, axis=1).mean())
-        changes = _region_changes(model, S, f_mm)
-        if changes[_loudest(changes)][2] < 0:
-            f_mm = -f_mm
-            changes = {name: -change for name, change in changes.items()}
-        directions.append(f_mm)
-        words.append(_words(changes))
-    per_mm = np.array([np.linalg.norm(Pi @ f, axis=1).mean() for f in directions])
-    return FlexibilityModes(
-        fit, np.array(directions), 100 * per_mm / fit.interocular_px, tuple(words)
-    )
+    return int(count)
 
 
-@lru_cache(maxsize=8)
-def evaluation_modes(model: FaceModel) -> Array:
-    """Modes (E, 3, S) of the evaluation region, metres per standard deviation."""
-    every = np.arange(model.n_vertices) if model.evaluation is None else model.evaluation
-    return read_only(np.ascontiguousarray(model.rows(every)[1]))
+def one_of(name: str, value: object, known: tuple[str, ...]) -> None:
+    """ValueError unless `value` is one of the known words."""
+    if not isinstance(value, str) or value not in known:
+        raise ValueError(f"{name}: {shown(value)} is not {' or '.join(known)}")
 
 
-@lru_cache(maxsize=8)
-def gram(model: FaceModel) -> Array:
-    """G = Q^T Q (S, S) over the evaluation region, m^2."""
-    Q = evaluation_modes(model).reshape(-1, model.n_modes)
-    return read_only(Q.T @ Q)
+def pose_columns(pose: object, known: tuple[str, ...], free_distance: object) -> int:
+    """How many parameters of the camera follow: 0 for known[0], "fixed"; else 6, or 7 with the distance."""
+    one_of("pose", pose, known)
+    if not isinstance(free_distance, bool | np.bool_):
+        raise ValueError(f"free_distance: {shown(free_distance)} is not True or False")
+    if pose == "fixed" and free_distance:
+        raise ValueError(
+            f"free_distance: a fixed pose has a fixed distance; give pose={known[1]!r} with it"
+        )
+    return 0 if pose == "fixed" else 7 if free_distance else 6
 
 
-def _region_changes(model: FaceModel, S: int, f: Array) -> dict[str, Array]:
-    """Mean movement (3,) of each named region along f: x outward on both sides, y up, z forward; metres."""
-    return {name: modes[:, :S] @ f for name, modes in _regions(model)}
+class Linear(NamedTuple):
+    """Jacobian of the L visible landmarks, pixels."""
+
+    shape: Array  # (2 L, S) by alpha
+    pose: Array  # (2 L, 7) by turn, t_xy, log s, kappa
 
 
-@lru_cache(maxsize=8)
-def _regions(model: FaceModel) -> tuple[tuple[str, Array], ...]:
-    """(name, mean movement (3, S) by each mode) of the regions that d_S measures and of the ears.
+def linearised(model: FaceModel, fit: Fit) -> Linear:
+    """The reprojection's, MATH.md 1."""
+    points, modes = _landmarks(model, fit)
+    S = modes.shape[2]
+    J = jacobian(fit.camera, points, modes).reshape(-1, S + 7)
+    return Linear(J[:, :S], J[:, S:])
 
-    The back of the head is free to follow and would always be the loudest. A model that names no part is one "face".
-    """
-    every = np.arange(model.n_vertices) if model.evaluation is None else model.evaluation
-    parts = {
-        name: vertices
-        for name, vertices in model.regions.items()
-        if name == "ears" or np.isin(vertices, every).mean() > 0.5
-    }
-    rows = []
-    for name, vertices in (parts or {"face": every}).items():
+
+def algebraic(model: FaceModel, fit: Fit) -> Linear:
+    """The DLT's: K_i (R v_i + t) over t_z with K_i / t_z = [[s, 0, -kappa x], [0, s, -kappa y]], x observed."""
+    points, modes = _landmarks(model, fit)
+    observation, camera = fit.observation, fit.camera
+    x = observation.points[observation.visible] - observation.centre
+    K = np.zeros((len(x), 2, 3))
+    K[:, 0, 0] = K[:, 1, 1] = camera.s
+    K[:, :, 2] = -camera.kappa * x
+    q = points @ camera.R.T
+    pose = np.zeros((len(x), 2, 7))
+    pose[:, :, :3] = K @ -_cross(q)
+    pose[:, :, 3:5] = K[:, :, :2]
+    pose[:, :, 5] = camera.s * (q[:, :2] + camera.t)
+    pose[:, :, 6] = -q[:, 2:] * x
+    return Linear(((K @ camera.R) @ modes).reshape(2 * len(x), -1), pose.reshape(-1, 7))
+
+
+def _landmarks(model: FaceModel, fit: Fit) -> tuple[Array, Array]:
+    """Visible landmarks of the fitted face (L, 3) and their modes (L, 3, S), metres."""
+    S = len(fit.alpha)
+    vertices = fit.observation.vertices(model)[fit.observation.visible]
+    if len(vertices) > MANY:  # not worth keeping, see MANY
         mean, modes = model.rows(vertices)
-        outward = np.sign(mean[:, 0])  # +1 left, -1 right
-        x = outward @ modes[:, 0] / len(vertices)
-        rows.append((name, read_only(np.stack([x, *modes[:, 1:].mean(axis=0)]))))
-    return tuple(rows)
+        modes = np.ascontiguousarray(modes[:, :, :S])
+    else:
+        mean, _, modes = landmark_rows(model, tuple(vertices.tolist()), S)
+    return mean + modes @ fit.alpha, modes
 
 
-def _loudest(changes: dict[str, Array]) -> str:
-    return max(changes, key=lambda name: abs(changes[name][2]))
+def _cross(q: Array) -> Array:
+    """(L, 3, 3) of q (L, 3): [q]x."""
+    x, y, z = q.T
+    o = np.zeros_like(x)
+    return np.stack([o, -z, y, z, o, -x, -y, x, o], axis=1).reshape(-1, 3, 3)
 
 
-def _words(changes: dict[str, Array]) -> str:
-    """Such as "nose forward, ears back": the two largest movements, of two regions in two ways."""
-    moves = sorted(
-        (
-            (abs(change[axis]), name, axis, change[axis] > 0)
-            for name, change in changes.items()
-            for axis in range(3)
-        ),
-        reverse=True,
-    )
-    first = moves[0]
-    second = next((m for m in moves[1:] if m[1] != first[1] and m[2:] != first[2:]), None)
-    said = [m for m in (first, second) if m is not None and m[0] > 0.3 * first[0]]
-    return ", ".join(
-        f"{name} {DIRECTIONS[axis][0 if positive else 1]}" for _, name, axis, positive in said
-    )
+class PoseFree(NamedTuple):
+    """What shape does to the landmarks when the pose follows."""
+
+    shape: Array  # (2 L, S) (I - J_p J_p^+) Pi
+    steps: Array  # (7, S) -J_p^+ Pi, how the pose follows
+
+
+def without_pose(rows: Linear, columns: int) -> PoseFree:
+    """The first `columns` of the pose taken out: 0, the pose is held; 6, its distance is held; 7.
+
+    Thin QR, pivoted on columns of unit length: where two motions of the camera look the same, as a turn and a shift of
+    landmarks that lie in one plane, one of them is left at rest.
+    """
+    Pi, J_p = rows.shape, rows.pose[:, :columns]
+    steps = np.zeros((7, Pi.shape[1]))
+    if columns == 0:
+        return PoseFree(Pi, steps)
+    unit = np.linalg.norm(J_p, axis=0)
+    unit[unit == 0] = 1.0
+    decomposed = qr(J_p / unit, mode="economic", pivoting=True, check_finite=False)
+    Q, U, pivots = cast("tuple[Array, Array, IntArray]", decomposed)
+    rank = int((np.abs(np.diag(U)) > SAME_MOTION * abs(U[0, 0])).sum())
+    Q, U, pivots = Q[:, :rank], U[:rank, :rank], pivots[:rank]
+    along = Q.T @ Pi
+    steps[pivots] = -solve_triangular(U, along, check_finite=False) / unit[pivots, None]
+    return PoseFree(Pi - Q @ along, steps)
+
+
+def most_flexible(Pi: Array, W: Array) -> Array:
+    """F (S, S), columns with F^T G F = I and the least |Pi f| first; W^T G W = I.
+
+    Columns that Pi (m, S) does not see have the least |f| first.
+    """
+    A = Pi @ W
+    mu, V = np.linalg.eigh(A.T @ A)
+    F = W @ V
+    unseen = int((mu <= INVISIBLE * mu[-1]).sum())
+    if unseen > 1:
+        F_0 = F[:, :unseen]
+        F[:, :unseen] = F_0 @ np.linalg.eigh(F_0.T @ F_0)[1]
+    return F
+
+
+def continued(previous: Array, F: Array, G: Array, count: int) -> tuple[IntArray, Array]:
+    """Order (S,) of the columns of F that continues the directions `previous` (K, S), and the signs of its first P.
+
+    P = min(K, count). The assignment of largest sum |F_old^T G F| (Hungarian method), old directions at unit length.
+    """
+    from scipy.optimize import linear_sum_assignment  # 0.2 s to import: only where it is needed
+
+    S = len(F)
+    if previous.shape[1] != S:
+        raise ValueError(f"previous: of {previous.shape[1]} shape modes, the fit has {S}")
+    old = previous[:count]
+    alike = old @ G @ F  # (P, S)
+    alike /= np.sqrt(((old @ G) * old).sum(axis=1))[:, None]
+    rows, chosen = linear_sum_assignment(np.abs(alike), maximize=True)
+    rest = np.setdiff1d(np.arange(S), chosen)
+    signs = np.where(alike[rows, chosen] < 0, -1.0, 1.0)
+    return np.concatenate([chosen, rest]), signs
+
+
+def positive(name: str, value: object) -> float:
+    """`value` as a float above 0 and finite."""
+    checked = number(name, value)
+    if not 0 < checked < np.inf:
+        raise ValueError(f"{name}: {checked:g} is not above 0 and finite")
+    return checked

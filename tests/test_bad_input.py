@@ -102,7 +102,18 @@ BORDERS: dict[str, tuple[Callable[..., Any], str]] = {
     "flexibility_modes count": (lambda value: fa.flexibility_modes(MODEL, FIT, value), "count"),
     "flexibility_modes model": (lambda value: fa.flexibility_modes(value, FIT), "model"),
     "flexibility_modes fit": (lambda value: fa.flexibility_modes(MODEL, value), "fit"),
+    **{
+        f"flexibility_modes {name}": (lambda value, name=name: fa.flexibility_modes(MODEL, FIT, **{name: value}), name)
+        for name in ("linearisation", "pose", "free_distance", "previous")
+    },
     "reach": (lambda value: fa.flexibility_modes(MODEL, FIT).reach(value), "mode"),
+    "truncated": (lambda value: fa.flexibility_modes(MODEL, FIT, None).truncated(value), "surface_mm"),
+    "posterior_modes count": (lambda value: fa.posterior_modes(MODEL, FIT, value), "count"),
+    **{
+        f"posterior_modes {name}": (lambda value, name=name: fa.posterior_modes(MODEL, FIT, **{name: value}), name)
+        for name in ("noise_px", "pose", "free_distance", "previous")
+    },
+    "surface_spread": (lambda value: fa.surface_spread(MODEL, FIT, noise_px=value), "noise_px"),
     "nearest": (SWEEP.nearest, "distance"),
     "interval": (SWEEP.interval, "tolerance_percent"),
 }  # fmt: skip
@@ -154,8 +165,13 @@ def assert_sound(result: Any) -> None:
             assert np.isfinite(result.centre).all()
         case fa.Interval():
             assert 0 < result.tolerance_percent < np.inf
-        case fa.FlexibilityModes():
+        case fa.FlexibilityModes() | fa.PosteriorModes():
             assert np.isfinite(result.directions).all()
+        case fa.KeptModes():
+            assert 0 < result.surface_mm < np.inf
+        case fa.SurfaceSpread():
+            assert 0 < result.noise_px < np.inf
+            assert 0 <= result.total_mm <= result.prior_mm * (1 + 1e-9)
         case _:
             assert np.isfinite(result).all()
 

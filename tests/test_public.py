@@ -26,7 +26,10 @@ MEMBERS = {
         "alpha", "converged", "cost", "d_l_percent", "distance", "focal", "projected", "rotation", "scale", "status",
         "translation", "vertices",
     },
-    fa.FlexibilityModes: {"directions", "landmark_percent", "reach", "words"},
+    fa.FlexibilityModes: {"camera", "directions", "landmark_percent", "reach", "truncated", "words"},
+    fa.KeptModes: {"kept", "plausible", "plausible_faces", "plausible_upper"},
+    fa.PosteriorModes: {"amplitude_mm", "directions", "landmark_percent", "total_mm", "words"},
+    fa.SurfaceSpread: {"distance_mm", "pose_mm", "prior_mm", "shape_mm", "total_mm"},
     fa.Interval: {"best_d_l_percent", "empty", "high", "low", "pieces", "tolerance_percent"},
     fa.Scheme: {"eyes_meaning", "name", "points", "vertices"},
     fa.Sweep: {
@@ -49,7 +52,20 @@ SIGNATURES = {
         },
     ),
     fa.sweep_distance: (["model", "observation", "distances"], OPTIONS),
-    fa.flexibility_modes: (["model", "fit", "count"], {}),
+    fa.flexibility_modes: (
+        ["model", "fit", "count"],
+        {
+            "linearisation": "reprojection",
+            "pose": "fixed",
+            "free_distance": False,
+            "previous": None,
+        },
+    ),
+    fa.posterior_modes: (
+        ["model", "fit", "count"],
+        {"noise_px": None, "pose": "free", "free_distance": False, "previous": None},
+    ),
+    fa.surface_spread: (["model", "fit"], {"noise_px": None}),
 }
 
 
