@@ -18,23 +18,36 @@ from .flex import FlexibilityModes, flexibility_modes
 from .io import load_landmarks, load_model
 from .model import FaceModel, Scheme, Subject
 from .observation import Observation, observe
+from .posterior import (
+    DistanceDensity,
+    DistanceInterval,
+    FaceSamples,
+    Posterior,
+    condition,
+    posterior,
+)
 from .sweep import Interval, Sweep, sweep_distance
 
 __all__ = [
     "AssetError",
     "ContourFit",
     "ContourStatus",
+    "DistanceDensity",
+    "DistanceInterval",
     "FaceModel",
+    "FaceSamples",
     "Failure",
     "Fit",
     "FitOptions",
     "FlexibilityModes",
     "Interval",
     "Observation",
+    "Posterior",
     "Scheme",
     "Status",
     "Subject",
     "Sweep",
+    "condition",
     "contour_fit",
     "fit",
     "fit_batch",
@@ -42,5 +55,6 @@ __all__ = [
     "load_landmarks",
     "load_model",
     "observe",
+    "posterior",
     "sweep_distance",
 ]
