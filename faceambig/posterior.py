@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import Array, checked, number, read_only, shown, whole
+from .arrays import Array, IntArray, checked, number, read_only, shown, whole
 from .camera import jacobian
 from .fitting import Fit, FitOptions
 from .fitting.solve import Problem, evaluate, normal_equations
@@ -410,7 +410,7 @@ def _smooth(x: Array, y: Array, share: Array) -> Array:
     Slopes are those of the parabola through three neighbours. Local: a cliff far from the top leaves no ripple there.
     """
     step = np.diff(x)[:, None]
-    slope = np.gradient(y, x, edge_order=min(2, len(x) - 1))[:, None]
+    slope = np.gradient(y, x, edge_order=2 if len(x) > 2 else 1)[:, None]
     u, left, right = share[None], y[:-1, None], y[1:, None]
     bent = (slope[:-1] * step - (right - left)) * (1 - u) - (slope[1:] * step - (right - left)) * u
     return np.append((left + u * (right - left) + u * (1 - u) * bent).ravel(), y[-1])
@@ -457,7 +457,7 @@ def _refuse_unconverged(fit: Fit) -> None:
         raise ValueError(f"fit: {where} did not converge ({fit.status}); raise max_steps")
 
 
-def _nearest(nodes: Array, kappas: Array) -> Array:
+def _nearest(nodes: Array, kappas: Array) -> IntArray:
     """(n,) which of nodes (D,), ascending, is nearest to each kappa (n,)."""
     middles = 0.5 * (nodes[1:] + nodes[:-1])
     return np.searchsorted(middles, kappas)

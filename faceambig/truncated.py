@@ -13,8 +13,8 @@ from scipy.special import log_ndtr, ndtr, ndtri
 
 from .arrays import Array, IntArray
 
-ROUNDS, DAMPING = 200, 0.7  # parallel updates at full length may swing
-SAME = 1e-7  # sd by which means still move when they have settled
+ROUNDS, DAMPING = 1000, 0.7  # parallel updates at full length may swing
+SAME = 1e-7  # of an sd: walls that pull the mean by no more have settled
 SWEEPS = 25  # sds have settled; 200 sweeps change them by less than 1 %
 LEAST = 1e-300  # ndtri of less is minus infinity
 
@@ -24,26 +24,48 @@ def box_moments(mean: Array, precision: Array, box: float) -> tuple[Array, Array
 
     mean (D, S) and precision (D, S, S) are those before the cut.
     """
-    eye = np.eye(mean.shape[1])
     if box == np.inf:
-        return np.zeros(len(mean)), mean, np.linalg.solve(precision, eye)
+        return np.zeros(len(mean)), mean, _inverse(precision)
     pull = (precision @ mean[..., None])[..., 0]
-    tau, nu = np.zeros_like(mean), np.zeros_like(mean)  # walls as exp(-tau x^2 / 2 + nu x)
+    walls = np.zeros_like(mean), np.zeros_like(mean)
     for _ in range(ROUNDS):
-        C = np.linalg.solve(precision + tau[..., None] * eye, eye)
-        m, v = (C @ (pull + nu)[..., None])[..., 0], np.diagonal(C, axis1=1, axis2=2)
-        v_cavity = 1.0 / (1.0 / v - tau)
-        m_cavity = v_cavity * (m / v - nu)
-        log_share, m_cut, v_cut = cut_moments(m_cavity, v_cavity, box)
-        if (np.abs(m_cut - m) <= SAME * np.sqrt(v)).all():
-            break
-        tau += DAMPING * (np.maximum(1.0 / v_cut - 1.0 / v_cavity, 0.0) - tau)
-        nu += DAMPING * (m_cut / v_cut - m_cavity / v_cavity - nu)
-    # Each wall's Gaussian is scaled to have the wall's share; then the integral of their product with ours
+        log_share, m, C, better = _round(mean, precision, pull, walls, box)
+        step = DAMPING * (better[0] - walls[0]), DAMPING * (better[1] - walls[1])
+        if (np.abs(step[1] - step[0] * m) <= SAME / np.sqrt(_diagonal(C))).all():
+            return log_share, m, C
+        walls = walls[0] + step[0], walls[1] + step[1]
+    raise ValueError(
+        f"box: moments inside {box:g} sd did not settle in {ROUNDS} rounds; leave it out"
+    )
+
+
+def _round(
+    mean: Array, precision: Array, pull: Array, walls: tuple[Array, Array], box: float
+) -> tuple[Array, Array, Array, tuple[Array, Array]]:
+    """Log of the share, mean, covariance with `walls`, exp(-tau x^2 / 2 + nu x); and the walls that these call for."""
+    tau, nu = walls
+    stiff = precision + tau[..., None] * np.eye(mean.shape[1])
+    C = _inverse(stiff)
+    m, v = (C @ (pull + nu)[..., None])[..., 0], _diagonal(C)
+    v_cavity = 1.0 / (1.0 / v - tau)
+    m_cavity = v_cavity * (m / v - nu)
+    log_share, m_cut, v_cut = cut_moments(m_cavity, v_cavity, box)
+    # Each wall is scaled to have the share that it leaves of its cavity; then the integral of their product with ours
     site = 0.5 * (np.log(v / v_cavity) + m**2 / v - m_cavity**2 / v_cavity)
-    product = 0.5 * (np.linalg.slogdet(precision)[1] + np.linalg.slogdet(C)[1])
-    product += 0.5 * (np.vecdot(m, pull + nu) - np.vecdot(mean, pull))
-    return (log_share - site).sum(axis=1) + product, m, C
+    product = np.linalg.slogdet(precision)[1] - np.linalg.slogdet(stiff)[1]
+    product += np.vecdot(m, pull + nu) - np.vecdot(mean, pull)
+    log_share = (log_share - site).sum(axis=1) + 0.5 * product
+    better = np.maximum(1.0 / v_cut - 1.0 / v_cavity, 0.0), m_cut / v_cut - m_cavity / v_cavity
+    return log_share, m, C, better
+
+
+def _inverse(precision: Array) -> Array:
+    """(D, S, S): here the covariance itself is asked for."""
+    return np.linalg.solve(precision, np.eye(precision.shape[1])).astype(np.float64, copy=False)
+
+
+def _diagonal(C: Array) -> Array:
+    return np.diagonal(C, axis1=1, axis2=2)
 
 
 def cut_moments(mean: Array, variance: Array, box: float) -> tuple[Array, Array, Array]:

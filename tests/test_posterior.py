@@ -75,7 +75,7 @@ def test_shapes_at_one_distance_are_those_of_a_markov_chain_in_a_box_that_cuts()
     assert (np.abs(fit.alpha) == 1.5).any()  # the optimum is on the wall
     chain = drawn_by_metropolis(post, fit, free=False, seed=2)[:, :S]
     narrow = fa.posterior(
-        MODEL, observation, [fit.distance, 1.0001 * fit.distance],
+        MODEL, observation, np.array([1.0, 1.0001]) / fit.camera.kappa,
         noise_px=post.sigma_px, box=1.5, beyond=0.0,
     )  # fmt: skip
     mean, covariance = narrow.shape_moments()
@@ -85,8 +85,10 @@ def test_shapes_at_one_distance_are_those_of_a_markov_chain_in_a_box_that_cuts()
     agree(draws.mean(axis=0), draws.std(axis=0), chain)
 
 
-def test_distances_and_shapes_are_those_of_a_markov_chain():
-    post = fa.posterior(MODEL, photograph(0, 0.5, 1.0), beyond=0.0)
+@pytest.mark.parametrize("box", [None, 1.0])
+def test_distances_and_shapes_are_those_of_a_markov_chain(box):
+    observation = photograph(0, 0.5, 1.0, limit=box or np.inf)
+    post = fa.posterior(MODEL, observation, box=box, beyond=0.0)
     best = min(post.sweep.fits, key=lambda fit: fit.cost)
     chain = drawn_by_metropolis(post, best, free=True, seed=0)
     draws = post.sample(4000, seed=1)
@@ -97,7 +99,7 @@ def test_distances_and_shapes_are_those_of_a_markov_chain():
     agree(log_t.mean(axis=0), log_t.std(axis=0), chain[:, -1:])
     for level in (0.5, 0.95):
         interval = post.interval(level)
-        low, high = np.log([interval.low, interval.high])
+        low, high = np.log(interval.low), np.log(interval.high or np.inf)
         # 100 chains, about 40 independent draws each: 0.9 points; Laplace is allowed the rest
         assert np.mean((chain[:, -1] > low) & (chain[:, -1] < high)) == pytest.approx(
             level, abs=0.04
@@ -123,10 +125,10 @@ def test_the_truth_is_inside_the_intervals_as_often_as_they_say(calibration):
     cases = calibration.drawn_faces(MODEL, 60, 1.0, scheme="egg")
     found = calibration.calibration(MODEL, cases, fits=16)
     for level, share in zip(calibration.LEVELS, found.shares, strict=True):
-        low, high = binom.ppf([RARE / 2, 1 - RARE / 2], 60, level)
+        low, high = (float(binom.ppf(p, 60, level)) for p in (RARE / 2, 1 - RARE / 2))
         assert low <= 60 * share <= high
     # of 60 uniform numbers
-    assert found.pit == pytest.approx(0.5, abs=norm.isf(RARE / 2) / np.sqrt(12 * 60))
+    assert found.pit == pytest.approx(0.5, abs=float(norm.isf(RARE / 2)) / np.sqrt(12 * 60))
 
 
 def test_the_distances_of_the_embedded_head_hold_the_truth(embedded):
@@ -314,9 +316,8 @@ def test_moments_and_draws_of_a_correlated_gaussian_are_those_of_rejection():
     rng = np.random.default_rng(0)
     A = rng.standard_normal((4, 4))
     covariance, centre = A @ A.T + 0.3 * np.eye(4), np.array([1.5, 0.0, -0.5, 2.0])
-    log_share, mean, cut = box_moments(
-        centre[None], np.linalg.solve(covariance, np.eye(4))[None], 2.0
-    )
+    precision = np.asarray(np.linalg.solve(covariance, np.eye(4))[None], dtype=np.float64)
+    log_share, mean, cut = box_moments(centre[None], precision, 2.0)
     every = centre + rng.standard_normal((400_000, 4)) @ np.linalg.cholesky(covariance).T
     kept = every[(np.abs(every) <= 2).all(axis=1)]
     sd = kept.std(axis=0)
@@ -325,7 +326,6 @@ def test_moments_and_draws_of_a_correlated_gaussian_are_those_of_rejection():
     assert np.abs((mean[0] - kept.mean(axis=0)) / sd).max() < 0.02
     assert np.abs(np.sqrt(np.diag(cut[0])) / sd - 1).max() < 0.03
     n = 20_000
-    precision = np.linalg.solve(covariance, np.eye(4))[None]
     which, means = np.zeros(n, dtype=np.intp), np.tile(centre, (n, 1))
     draws = box_draws(means, precision, which, 2.0, np.zeros((n, 4)), rng)
     assert np.abs(draws).max() <= 2

@@ -15,19 +15,24 @@ import faceambig as fa
 ROOT = Path(__file__).parent.parent
 # Names users have written into their programs: more may come, none of these may go or change
 KEPT = {
-    "AssetError", "ContourFit", "ContourStatus", "FaceModel", "Fit", "FitOptions", "FlexibilityModes", "Interval",
-    "Observation", "Scheme", "Status", "Subject", "Sweep", "contour_fit", "fit", "flexibility_modes", "load_landmarks",
-    "load_model", "observe", "sweep_distance",
+    "AssetError", "ContourFit", "ContourStatus", "DistanceDensity", "DistanceInterval", "FaceModel", "FaceSamples",
+    "Fit", "FitOptions", "FlexibilityModes", "Interval", "Observation", "Posterior", "Scheme", "Status", "Subject",
+    "Sweep", "condition", "contour_fit", "fit", "flexibility_modes", "load_landmarks", "load_model", "observe", "posterior",
+    "sweep_distance",
 }  # fmt: skip
 MEMBERS = {
     fa.FaceModel: {"faces", "mean", "n_modes", "n_vertices", "scheme", "subject", "truncate", "vertices"},
     fa.ContourFit: {"fit", "iterations", "movement_mm", "pairs", "status"},
+    fa.DistanceDensity: {"beyond", "cumulative", "density", "distances", "masses", "quantiles"},
+    fa.DistanceInterval: {"high", "level", "low"},
+    fa.FaceSamples: {"alpha", "distances", "vertices"},
     fa.Fit: {
         "alpha", "converged", "cost", "d_l_percent", "distance", "focal", "projected", "rotation", "scale", "status",
         "translation", "vertices",
     },
     fa.FlexibilityModes: {"directions", "landmark_percent", "reach", "words"},
     fa.Interval: {"best_d_l_percent", "empty", "high", "low", "pieces", "tolerance_percent"},
+    fa.Posterior: {"distance_density", "interval", "sample", "shape_moments", "sigma_px", "sweep", "vertex_sd_mm"},
     fa.Scheme: {"eyes_meaning", "name", "points", "vertices"},
     fa.Sweep: {
         "d_l_percent", "disagreed", "distances", "fits", "interval", "nearest", "orthographic", "speed_mm_per_octave",
@@ -50,6 +55,18 @@ SIGNATURES = {
     ),
     fa.sweep_distance: (["model", "observation", "distances"], OPTIONS),
     fa.flexibility_modes: (["model", "fit", "count"], {}),
+    fa.posterior: (
+        ["model", "observation", "distances"],
+        {
+            "prior": None,
+            "beyond": 0.05,
+            "modes": None,
+            "missing_modes": True,
+            "box": None,
+            "noise_percent": 1.0,
+        },
+    ),
+    fa.condition: (["model", "fit"], {}),
 }
 
 
