@@ -13,7 +13,7 @@ from scipy.integrate import quad
 from scipy.stats import binom, norm, truncnorm
 
 import faceambig as fa
-from faceambig.fitting.solve import Problem
+from faceambig.fitting.solve import Problem, evaluate, normal_equations
 from faceambig.fitting.task import prepare
 from faceambig.truncated import box_draws, box_moments, cut_moments
 from reference import log_posterior, metropolis
@@ -104,6 +104,34 @@ def test_distances_and_shapes_are_those_of_a_markov_chain(box):
         assert np.mean((chain[:, -1] > low) & (chain[:, -1] < high)) == pytest.approx(
             level, abs=0.04
         )
+
+
+@pytest.mark.parametrize("box", [None, 1.0])
+def test_distances_weigh_as_much_as_the_integrals_over_shape_and_pose(box):
+    # The determinant and the share inside the box move a density by less than a chain of this length can tell
+    observation = photograph(3, 0.5, 1.0, limit=box or np.inf)
+    post = fa.posterior(MODEL, observation, box=box)
+    problem, laplace = problem_of(post), post.laplace
+    rng, found, said = np.random.default_rng(0), [], []
+    for distance in (0.25, 0.5, 2.0):
+        fit = post.sweep.nearest(distance)
+        point = evaluate(problem, fit.camera.view, fit.alpha)
+        H, _ = normal_equations(problem, *point[:4])
+        # Importance sampling; a proposal half as wide again leaves no tail without draws
+        scale = np.linalg.cholesky(2.25 * post.sigma_px**2 * np.linalg.solve(H, np.eye(len(H))))
+        centre = np.array([*fit.alpha, 0, 0, 0, *fit.camera.t, np.log(fit.camera.s)])
+        z = rng.standard_normal((60_000, len(H)))
+        theta = centre + z @ scale.T
+        log_p = log_posterior(
+            problem, fit.camera.R, theta, post.sigma_px, -np.log(fit.camera.kappa)
+        )
+        log_w = log_p + 0.5 * (z**2).sum(axis=1) + np.log(np.diag(scale)).sum()
+        w = np.exp(log_w - log_w.max())
+        assert w.sum() ** 2 / (w**2).sum() > 1000  # effective draws: the logarithm is known to 0.03
+        found.append(np.log(w.mean()) + log_w.max())
+        said.append(laplace.log_evidence[np.argmin(np.abs(laplace.kappas - fit.camera.kappa))])
+    assert np.abs(np.diff(found) - np.diff(said)).max() < 0.05
+    assert np.abs(np.diff(found)).max() > 1.0
 
 
 # --- calibration ----------------------------------------------------------------------------------

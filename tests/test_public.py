@@ -17,8 +17,8 @@ ROOT = Path(__file__).parent.parent
 KEPT = {
     "AssetError", "ContourFit", "ContourStatus", "DistanceDensity", "DistanceInterval", "FaceModel", "FaceSamples",
     "Fit", "FitOptions", "FlexibilityModes", "Interval", "Observation", "Posterior", "Scheme", "Status", "Subject",
-    "Sweep", "condition", "contour_fit", "fit", "flexibility_modes", "load_landmarks", "load_model", "observe", "posterior",
-    "sweep_distance",
+    "Sweep", "condition", "contour_fit", "fit", "flexibility_modes", "load_landmarks", "load_model", "observe",
+    "posterior", "sweep_distance",
 }  # fmt: skip
 MEMBERS = {
     fa.FaceModel: {"faces", "mean", "n_modes", "n_vertices", "scheme", "subject", "truncate", "vertices"},
