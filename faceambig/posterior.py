@@ -27,7 +27,7 @@ from .fitting.solve import Problem, evaluate, normal_equations
 from .fitting.task import Task, landmark_rows, prepare, start_of
 from .flex import gram
 from .model import FaceModel
-from .observation import Observation
+from .observation import LARGEST_PX, Observation
 from .sweep import Sweep, follow, sweep_distance
 from .truncated import box_draws, box_moments
 
@@ -39,6 +39,7 @@ WITHIN, ENOUGH = (
     9,
 )  # so many fits less than this below the highest log density: the cubics have its shape
 FINEST = 1e-4  # relative, between two distances: nearer ones are not told apart
+FINEST_PX = 1e-6  # sigma: less is rounding of the pixels' own digits
 
 Prior = Callable[[Array], ArrayLike]
 
@@ -150,9 +151,11 @@ class Posterior:
 
         Under a box by Gibbs, 25 sweeps from a start that has about the right moments already.
         """
-        if whole("n", n) < 1:
+        n = whole("n", n)
+        if n < 1:
             raise ValueError(f"n: {shown(n)} is not at least 1")
-        if whole("seed", seed) < 0:
+        seed = whole("seed", seed)
+        if seed < 0:
             raise ValueError(f"seed: {shown(seed)} is negative")
         rng, L = np.random.default_rng(seed), self.laplace
         distances = self.distance_density.quantiles(rng.random(n))
@@ -255,9 +258,10 @@ def posterior(
         modes = model.n_modes
     sigma2 = None
     if noise_px is not None:
-        sigma2 = number("noise_px", noise_px) ** 2
-        if not 0 < sigma2 < np.inf:
-            raise ValueError(f"noise_px: {noise_px:g} is not above 0 and finite")
+        sigma = number("noise_px", noise_px)
+        if not FINEST_PX <= sigma <= LARGEST_PX:
+            raise ValueError(f"noise_px: {sigma:g} is not within {FINEST_PX:g} to {LARGEST_PX:g}")
+        sigma2 = sigma**2
     options = FitOptions(modes, box, noise_percent, sigma2, tolerance, max_steps)
     task = prepare(model, observation, options)
     variance = float(task.problem.prior_weight)

@@ -6,6 +6,7 @@ import importlib
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -268,6 +269,8 @@ def test_vertex_sds_are_those_of_the_drawn_faces(post):
 def test_the_same_seed_draws_the_same_faces(post):
     assert np.array_equal(post.sample(20, seed=4).alpha, post.sample(20, seed=4).alpha)
     assert not np.array_equal(post.sample(20, seed=4).alpha, post.sample(20, seed=5).alpha)
+    same: Any = np.array(4)  # a number that NumPy wrapped
+    assert np.array_equal(post.sample(20, seed=4).alpha, post.sample(20, seed=same).alpha)
 
 
 def test_surfaces_of_a_subdivided_model_have_sds_too(embedded):
@@ -392,7 +395,8 @@ GOOD = photograph(0, 0.5, 1.0)
         ({"prior": "uniform"}, "prior: 'uniform' is not a function"),
         ({"beyond": 1.0}, "beyond: 1 is not a probability"),
         ({"beyond": np.nan}, "beyond: nan is not a probability"),
-        ({"noise_px": 0.0}, "noise_px: 0 is not above 0"),
+        ({"noise_px": 0.0}, "noise_px: 0 is not within 1e-06 to 1e"),
+        ({"noise_px": 1e300}, r"noise_px: 1e\+300 is not within"),
         ({"noise_percent": 0.0}, "noise_percent: 0 is not within"),
         ({"modes": 7}, "modes: 7 of a model with 4"),
         ({"missing_modes": 1}, "missing_modes: 1 is not True or False"),
