@@ -131,7 +131,8 @@ def test_distances_weigh_as_much_as_the_integrals_over_shape_and_pose(box):
         assert w.sum() ** 2 / (w**2).sum() > 1000  # effective draws: the logarithm is known to 0.03
         found.append(np.log(w.mean()) + log_w.max())
         said.append(laplace.log_evidence[np.argmin(np.abs(laplace.kappas - fit.camera.kappa))])
-    assert np.abs(np.diff(found) - np.diff(said)).max() < 0.05
+    # Laplace's own error: 0.08 and 0.06 here; without the determinant 0.17, without the share in the box 3
+    assert np.abs(np.diff(found) - np.diff(said)).max() < 0.1
     assert np.abs(np.diff(found)).max() > 1.0
 
 
