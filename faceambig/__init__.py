@@ -19,6 +19,14 @@ from .flex import FlexibilityModes, KeptModes, flexibility_modes
 from .io import load_landmarks, load_model
 from .model import FaceModel, Scheme, Subject
 from .observation import Observation, observe
+from .posterior import (
+    DistanceDensity,
+    DistanceInterval,
+    FaceSamples,
+    Posterior,
+    condition,
+    posterior,
+)
 from .shading import ExplainedShading, Light, explain_shading, shade
 from .spread import PosteriorModes, SurfaceSpread, posterior_modes, surface_spread
 from .sweep import Interval, Sweep, sweep_distance
@@ -27,10 +35,13 @@ __all__ = [
     "AssetError",
     "ContourFit",
     "ContourStatus",
+    "DistanceDensity",
+    "DistanceInterval",
     "ExplainedShading",
     "ExtremeFace",
     "ExtremeFaces",
     "FaceModel",
+    "FaceSamples",
     "Failure",
     "Fit",
     "FitOptions",
@@ -39,12 +50,14 @@ __all__ = [
     "KeptModes",
     "Light",
     "Observation",
+    "Posterior",
     "PosteriorModes",
     "Scheme",
     "Status",
     "Subject",
     "SurfaceSpread",
     "Sweep",
+    "condition",
     "contour_fit",
     "explain_shading",
     "extreme_faces",
@@ -54,6 +67,7 @@ __all__ = [
     "load_landmarks",
     "load_model",
     "observe",
+    "posterior",
     "posterior_modes",
     "shade",
     "surface_spread",

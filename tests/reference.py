@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 
 import numpy as np
 from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
 
 from faceambig.camera import Camera
 from faceambig.fitting.solve import Problem, Solution, moved_camera
@@ -132,3 +134,58 @@ def traced(
             hit &= along < 1
         lead[i] = (-way[2] * along[hit]).max(initial=0.0)
     return lead
+
+
+def metropolis(
+    log_density: Callable[[np.ndarray], np.ndarray],
+    start: np.ndarray,
+    *,
+    steps: int,
+    burn_in: int,
+    thin: int,
+    seed: int,
+) -> np.ndarray:
+    """Draws (n, d) by random-walk Metropolis of many chains side by side, from `start` (chains, d).
+
+    During burn_in the proposal is learnt: the chains' own covariance, and a length that accepts a quarter. After it
+    nothing is changed any more, so what is kept comes from a Markov chain of log_density: (chains, d) -> (chains,).
+    """
+    rng = np.random.default_rng(seed)
+    x, at = start.copy(), log_density(start)
+    chains, d = x.shape
+    factor, length, kept, accepted = np.diag(x.std(axis=0)), 2.38 / np.sqrt(d), [], 0.0
+    for step in range(burn_in + steps):
+        if step < burn_in and step % 100 == 99:
+            factor = np.linalg.cholesky(np.cov(x.T) + 1e-12 * np.diag(x.var(axis=0)))
+            length *= np.exp(accepted / 100 - 0.25)
+            accepted = 0.0
+        new = x + length * rng.standard_normal((chains, d)) @ factor.T
+        there = log_density(new)
+        take = np.log(rng.random(chains)) < there - at
+        x, at = np.where(take[:, None], new, x), np.where(take, there, at)
+        accepted += take.mean()
+        if step >= burn_in and step % thin == 0:
+            kept.append(x)
+    return np.concatenate(kept)
+
+
+def log_posterior(
+    problem: Problem, R: np.ndarray, theta: np.ndarray, sigma: float, log_t: float | None = None
+) -> np.ndarray:
+    """log p (C,) of C faces theta (C, S + 6 or S + 7) = alpha, r, t_xy, log s[, log t_z], from the pinhole's formula.
+
+    The rotation is exp([r]x) R with Haar's density in r; t_xy, log s and log t_z flat; `log_t` if it is held.
+    """
+    S = problem.modes.shape[2]
+    alpha, r, t, log_s = theta[:, :S], theta[:, S : S + 3], theta[:, S + 3 : S + 5], theta[:, S + 5]
+    t_z = np.exp(theta[:, S + 6] if log_t is None else np.full(len(theta), log_t))
+    v = problem.mean + (alpha @ problem.modes.reshape(-1, S).T).reshape(len(theta), -1, 3)
+    q = v @ (Rotation.from_rotvec(r).as_matrix() @ R).swapaxes(1, 2)
+    Z = q[:, :, 2] + t_z[:, None]
+    f = np.exp(log_s) * t_z
+    x = f[:, None, None] * (q[:, :, :2] + t[:, None]) / Z[:, :, None]
+    e = ((x - problem.points) ** 2).sum(axis=2) @ problem.weights
+    haar = 2 * np.log(np.abs(np.sinc(np.linalg.norm(r, axis=1) / (2 * np.pi))))
+    log_p = -0.5 * e / sigma**2 - 0.5 * (alpha**2).sum(axis=1) + haar
+    inside = (np.abs(alpha) <= problem.box).all(axis=1) & (Z > 0).all(axis=1)
+    return np.where(inside, log_p, -np.inf)

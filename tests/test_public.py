@@ -15,13 +15,17 @@ import faceambig as fa
 ROOT = Path(__file__).parent.parent
 # Names users have written into their programs: more may come, none of these may go or change
 KEPT = {
-    "AssetError", "ContourFit", "ContourStatus", "FaceModel", "Fit", "FitOptions", "FlexibilityModes", "Interval",
-    "Observation", "Scheme", "Status", "Subject", "Sweep", "contour_fit", "fit", "flexibility_modes", "load_landmarks",
-    "load_model", "observe", "sweep_distance",
+    "AssetError", "ContourFit", "ContourStatus", "DistanceDensity", "DistanceInterval", "FaceModel", "FaceSamples",
+    "Fit", "FitOptions", "FlexibilityModes", "Interval", "Observation", "Posterior", "Scheme", "Status", "Subject",
+    "Sweep", "condition", "contour_fit", "fit", "flexibility_modes", "load_landmarks", "load_model", "observe",
+    "posterior", "sweep_distance",
 }  # fmt: skip
 MEMBERS = {
     fa.FaceModel: {"faces", "mean", "n_modes", "n_vertices", "scheme", "subject", "truncate", "vertices"},
     fa.ContourFit: {"fit", "iterations", "movement_mm", "pairs", "status"},
+    fa.DistanceDensity: {"beyond", "cumulative", "density", "distances", "masses", "quantiles"},
+    fa.DistanceInterval: {"high", "level", "low"},
+    fa.FaceSamples: {"alpha", "distances", "vertices"},
     fa.Fit: {
         "alpha", "converged", "cost", "d_l_percent", "distance", "focal", "projected", "rotation", "scale", "status",
         "translation", "vertices",
@@ -31,6 +35,7 @@ MEMBERS = {
     fa.PosteriorModes: {"amplitude_mm", "directions", "landmark_percent", "total_mm", "words"},
     fa.SurfaceSpread: {"distance_mm", "pose_mm", "prior_mm", "shape_mm", "total_mm"},
     fa.Interval: {"best_d_l_percent", "empty", "high", "low", "pieces", "tolerance_percent"},
+    fa.Posterior: {"distance_density", "interval", "sample", "shape_moments", "sigma_px", "sweep", "vertex_sd_mm"},
     fa.Scheme: {"eyes_meaning", "name", "points", "vertices"},
     fa.Sweep: {
         "d_l_percent", "disagreed", "distances", "fits", "interval", "nearest", "orthographic", "speed_mm_per_octave",
@@ -66,6 +71,18 @@ SIGNATURES = {
         {"noise_px": None, "pose": "free", "free_distance": False, "previous": None},
     ),
     fa.surface_spread: (["model", "fit"], {"noise_px": None}),
+    fa.posterior: (
+        ["model", "observation", "distances"],
+        {
+            "prior": None,
+            "beyond": 0.05,
+            "modes": None,
+            "missing_modes": True,
+            "box": None,
+            "noise_percent": 1.0,
+        },
+    ),
+    fa.condition: (["model", "fit"], {}),
 }
 
 
