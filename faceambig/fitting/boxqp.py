@@ -159,7 +159,7 @@ def _solve_free(
         if factor is None:
             part = H if everything else H.take(chosen, 0).take(chosen, 1)
             # .T of a C-ordered symmetric matrix is the Fortran order LAPACK wants: no transposed copy
-            factor, info = lapack.dpotrf(part.T, lower=1, clean=0)
+            factor, info = lapack.dpotrf(part.T, lower=1, clean=0, overwrite_a=not everything)
             if info != 0:
                 return None
             factors[name] = factor
