@@ -35,7 +35,7 @@ fix: .venv/.dev
 	.venv/bin/ruff format
 
 bench: .venv/.dev
-	@for name in fit budget derivative growth contours flex against_eos load detect; do \
+	@for name in fit budget derivative growth contours flex extremes against_eos load detect; do \
 		echo "== benchmarks/$$name.py"; .venv/bin/python benchmarks/$$name.py || exit 1; done
 
 # Stores the pictures of the tests anew: look at each one that changed before it is committed.
