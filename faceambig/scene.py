@@ -36,6 +36,27 @@ class Head:
     coarse_faces: NDArray[np.uint32] | None = (
         None  # over the first vertices: the mesh while a hand moves
     )
+    opacity: float = 1.0  # below 1: a ghost, drawn over what stands in the same slot
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Marks:
+    """Points marked on one head: screen-sized, so they never hide the surface."""
+
+    head: str  # name of the Head they lie on
+    points: Array  # (L, 3) metres, the head's own axes
+    tone: str  # "seen" (red cross) or "d_l" (blue circle), as in the photograph
+    names: tuple[str, ...] = ()  # L names to write beside them; empty: none
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lines:
+    """Straight lines in the room of one head: rays to the camera, its pyramid, the gap to the true face."""
+
+    name: str  # "rays", "pyramid", "errors"
+    head: str  # name of the Head in whose axes and slot they stand
+    segments: Array  # (n, 2, 3) metres, the head's own axes
+    tone: str  # "dim", "seen" or "d_l"
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +89,15 @@ class Photo:
         None  # (V, 3) the fitted face in camera axes, for the view "camera"
     )
     fit_focal: float | None = None  # pixels, per metre of depth as `focal`
+    pixels: NDArray[np.uint8] | None = None  # (height, width, 3) a real photograph, drawn instead
+    points_shown: bool = True
+    names_shown: bool = False
+    error_scale: float = (
+        0.0  # a line from each cross towards its circle, this many times its length
+    )
+    outline: Array | None = (
+        None  # (n, 2) pixels, the fitted face's outline; NaN rows part its pieces
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,6 +110,9 @@ class Curves:
     orthographic: tuple[float, float]  # d_L percent and d_S mm of the far-away camera
     true_distance: float  # metres
     tolerance_percent: float  # a person cannot tell below this
+    density: Array | None = None  # (D,) posterior of the distance, per octave, of largest value 1
+    intervals: tuple[tuple[float, float], ...] = ()  # metres: of 50 and 95 % posterior; inf: no end
+    beyond: float = 0.0  # share of the posterior beyond the last distance
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +127,7 @@ class Numbers:
     eyes_meaning: str  # the definition of d_L's unit
     flex_words: str = ""  # what the flexibility mode moves
     flex_mm: float = 0.0
+    reference: str = ""  # what d_S is measured to; empty: the true face
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,6 +153,9 @@ class Scene:
     curves: Curves | None = None
     legend: Legend | None = None
     through_camera: bool = False  # the picture is the photo itself, fitted face beside true face
+    blink: bool = False  # heads of one slot are shown in turn, one at a time, a second each
+    marks: tuple[Marks, ...] = ()
+    lines: tuple[Lines, ...] = ()
     pivot: tuple[float, float, float] = (
         0.0,
         0.0,
