@@ -62,10 +62,10 @@ def drawn_by_emcee(post: fa.Posterior, fit: fa.Fit, free: bool, seed: int) -> np
     # Differential evolution: its steps follow the long valley between shape and pose. Not emcee's snooker beside it:
     # with a fifth of those the sds came out up to a fifth too small
     move = emcee.moves.DEMove()
-    sampler = emcee.EnsembleSampler(*start.shape, log_p, moves=move, vectorize=True)
-    sampler.random_state = np.random.RandomState(seed).get_state()
+    sampler = emcee.EnsembleSampler(len(start), len(point), log_p, moves=move, vectorize=True)
+    sampler.random_state = np.random.RandomState(seed).get_state()  # emcee's own kind
     sampler.run_mcmc(start, STEPS)
-    return sampler.get_chain(discard=STEPS // 3, thin=10, flat=True)
+    return np.asarray(sampler.get_chain(discard=STEPS // 3, thin=10, flat=True))
 
 
 def agree(mean: np.ndarray, sd: np.ndarray, drawn: np.ndarray) -> None:
