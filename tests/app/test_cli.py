@@ -18,6 +18,7 @@ import faceambig as fa
 from commands import RECORD, printed, refused, write_pts
 from faceambig.io.schemes import mesh_of_ibug68
 from faceambig_app import cli, pipeline
+from faceambig_app.commands import sweep as sweep_command
 from faceambig_app.state import DEFAULT, FIELDS, ViewState, changed
 from scenes import need_renderer
 
@@ -234,7 +235,7 @@ def test_sweep_prints_every_fit_and_the_interval(capsys, pts, embedded, observat
     ],
 )
 def test_an_interval_is_a_sentence(interval, words):
-    assert words in cli.interval_words(interval)
+    assert words in sweep_command.interval_words(interval)
 
 
 @pytest.mark.parametrize("command", ["fit", "sweep"])
@@ -508,6 +509,15 @@ def test_the_installed_command_says_the_same_as_main(pts):
     bad = run("sweep", str(pts), "--to", "inf")
     assert bad.returncode == 2
     assert bad.stderr.count("\n") == 1
+
+
+def test_help_waits_for_nothing_heavy():
+    code = "import sys, faceambig_app.cli; print(*{name.partition('.')[0] for name in sys.modules})"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = set(run.stdout.split())
+    assert {"argparse", "faceambig_app", "msgspec"} <= loaded
+    heavy = {"numpy", "scipy", "faceambig", "cv2", "PIL", "viser", "pyrender", "trimesh"}
+    assert not loaded & heavy
 
 
 def test_errors_are_put_on_one_line():
