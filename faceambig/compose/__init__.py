@@ -43,7 +43,7 @@ from .face import (
     with_density,
 )
 from .heads import HALF_HEIGHT, SPACING, VIEWS, head, named_view, pivot
-from .overlays import BREAK, OVERLAYS, Station, apex, marks, pyramid, rays, station
+from .overlays import BREAK, OVERLAYS, Station, marks, pyramid, rays, station
 from .picture import outline, photo, photo_of_fit, with_fit
 from .row import PINS, SCALE_BAR, compose_pins, compose_row
 
@@ -94,6 +94,7 @@ SHOWS = ("both", "overlay", "blink", "difference")
 HIDEABLE = ("numbers", "truth", "actual")
 ERROR_SCALES = (1.0, 5.0, 10.0, 20.0)
 GHOST_OPACITY = 0.45
+MARGIN = 0.02  # metres between a drawn camera and the edge of the picture
 
 
 class Look(NamedTuple):
@@ -156,15 +157,14 @@ def compose(
     look = _asked(view, show, surface, overlays, hide, fade, true_camera)
     colours = _colours(subject, face, look, spread_mm)
     heads = _heads(subject, face, look, titles, colours)
-    around = () if view == "camera" else _cameras(face, look)
-    seen_from = _view(look, orbit, zoom, subject, [place for _, place in around])
+    lines = () if view == "camera" else tuple(_lines(subject, face, look, picture))
     told = curve
     if curve is not None and "actual" in look.hide:
         told = replace(curve, true_distance=np.nan)
     valued = look.surface in LEGENDS
     return Scene(
         heads=heads,
-        views=(seen_from,),
+        views=(_view(look, orbit, zoom, subject, lines),),
         photo=_picture(picture, face, look, error_scale),
         pivot=pivot(subject.model),
         numbers=numbers(face, reference=reference),
@@ -173,7 +173,7 @@ def compose(
         through_camera=view == "camera",
         blink=look.show == "blink" and len(heads) > 1,
         marks=_marks(subject, face, look),
-        lines=tuple(_lines(subject, face, look, picture, around, seen_from)),
+        lines=lines,
         scale_bar=SCALE_BAR if "scale" in look.overlays else 0.0,
         hide=look.hide,
         note=note,
@@ -290,22 +290,14 @@ def _cameras(face: Face, look: Look) -> tuple[tuple[str, Station], ...]:
     return ("true", station(look.true_camera)), fit
 
 
-def _lines(
-    subject: Subject,
-    face: Face,
-    look: Look,
-    picture: Photo,
-    cameras: Iterable[tuple[str, Station]],
-    seen_from: View,
-) -> Iterable[Lines]:
-    """Rays cut to what is shown: from a drawn camera on, else from where the picture ends."""
+def _lines(subject: Subject, face: Face, look: Look, picture: Photo) -> Iterable[Lines]:
+    """Rays cut to what is shown: from a drawn camera on, else from where the picture ends; and the cameras."""
     at = face.fit.observation.vertices(subject.model)
-    drawn = "pyramid" in look.overlays and seen_from.name == "top"
-    for name, place in cameras:
+    for name, place in _cameras(face, look):
         vertices, tone = (subject.vertices, "seen") if name == "true" else (face.vertices, "d_l")
         if "rays" in look.overlays:
             within = (np.array(pivot(subject.model)), HALF_HEIGHT)
-            if drawn:
+            if look.view == "top" and "pyramid" in look.overlays:
                 within = (np.zeros(3), BREAK) if place.far else None
             yield rays(name, place, picture, vertices[at], tone, within=within)
         if "pyramid" in look.overlays:
@@ -317,15 +309,14 @@ def _view(
     orbit: tuple[float, float],
     zoom: float,
     subject: Subject,
-    cameras: list[Station],
+    lines: tuple[Lines, ...],
 ) -> View:
     """The viewer's place; from above, cameras that are drawn are in the picture too."""
     name = "front" if look.view == "camera" else look.view
-    if name != "top" or "pyramid" not in look.overlays:
+    drawn = [line.segments for line in lines if line.name == "pyramid"]
+    if name != "top" or not drawn:
         return named_view(name, orbit=orbit, zoom=zoom)
-    # Seen from above, a camera before the face is below the pivot
-    z = pivot(subject.model)[2]
-    low = min(z - float(apex(place)[2]) for place in cameras) - 0.03
-    high = HALF_HEIGHT
-    half = max(HALF_HEIGHT, (high - low) / 2)
-    return named_view(name, zoom=zoom, half_height=half, rise=-(high + low) / 2)
+    # Seen from above, what lies before the face is below the pivot
+    front = max(float(segments[..., 2].max()) for segments in drawn) + MARGIN
+    low, high = min(pivot(subject.model)[2] - front, -HALF_HEIGHT), HALF_HEIGHT
+    return named_view(name, zoom=zoom, half_height=(high - low) / 2, rise=-(high + low) / 2)
