@@ -391,7 +391,7 @@ def test_a_file_that_is_no_state_is_refused_by_name(capsys, tmp_path, content, w
 
 
 @settings(max_examples=50)
-@given(states, st.text(min_size=1, max_size=20).filter(lambda name: "\0" not in name))
+@given(states(), st.text(min_size=1, max_size=20).filter(lambda name: "\0" not in name))
 def test_the_command_of_a_state_gives_it_back(state, out):
     with pytest.MonkeyPatch.context() as patch:
         calls: list[Any] = []

@@ -38,7 +38,7 @@ def test_the_table_names_every_field_of_the_state_and_only_those():
         assert field.help
 
 
-@given(states)
+@given(states())
 def test_json_gives_the_same_state_back(state):
     assert msgspec.json.decode(msgspec.json.encode(state), type=ViewState) == state
 
@@ -62,7 +62,7 @@ def test_json_that_is_no_state_is_refused(text, words):
         msgspec.json.decode(text, type=ViewState)
 
 
-@given(states, st.sampled_from(sorted({*FIELDS} - {"view", "orbit", "pins", "model"})), st.data())
+@given(states(), st.sampled_from(sorted({*FIELDS} - {"view", "orbit", "pins", "model"})), st.data())
 def test_a_change_changes_its_field_alone(state, name, data):
     value = data.draw(values(FIELDS[name]))
     after = changed(state, **{name: value})
@@ -70,7 +70,7 @@ def test_a_change_changes_its_field_alone(state, name, data):
     assert changed(after, **{name: getattr(state, name)}) == state
 
 
-@given(states)
+@given(states())
 def test_equal_states_are_one_key(state):
     twin = changed(state)
     assert twin == state
@@ -240,7 +240,7 @@ def test_what_may_not_stand_there_is_refused_in_one_line(name, bad, words):
         new(**{name: bad})
 
 
-@given(alone)
+@given(alone())
 def test_a_pin_is_the_face_alone(state):
     pin = short(state)
     assert (pin.target, pin.fitting, pin.bend) == (state.target, state.fitting, state.bend)
