@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from .fields import FIELDS, PINS
 from .state import DEFAULT, ViewState, changed, short
@@ -20,8 +21,8 @@ class Action:
     """Something a person can do; its words are at action.`name`."""
 
     name: str
-    key: str | None = None  # single letter, avoiding viser's W A S D Q E
-    modifier: str | None = None
+    key: Any = None  # single letter, avoiding viser's W A S D Q E
+    modifier: Any = None  # both as viser spells them
     change: Callable[[ViewState], ViewState] | None = None
 
 
@@ -59,7 +60,9 @@ def pin(state: ViewState) -> ViewState:
 
 def pin_distances(state: ViewState) -> ViewState:
     """The state with its faces at ROW_DISTANCES kept."""
-    faces = (changed(short(state), distance=metres, camera="perspective") for metres in ROW_DISTANCES)
+    faces = (
+        changed(short(state), distance=metres, camera="perspective") for metres in ROW_DISTANCES
+    )
     return changed(state, pins=tuple(faces), show="row")
 
 
@@ -75,7 +78,9 @@ def visit(number: int) -> Callable[[ViewState], ViewState]:
         if number >= len(state.pins):  # removed meanwhile
             return state
         kept = state.pins[number]
-        names = (name for name, field in FIELDS.items() if field.part in ("target", "fitting", "bend"))
+        names = (
+            name for name, field in FIELDS.items() if field.part in ("target", "fitting", "bend")
+        )
         face = {name: getattr(kept, name) for name in names if name != "model"}
         return changed(state, **face, show="both" if state.show == "row" else state.show)
 

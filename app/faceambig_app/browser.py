@@ -13,8 +13,8 @@ import viser
 
 from . import figures, guard, history
 from .actions import ACTIONS
-from .glide import Glide
 from .forms import command
+from .glide import Glide
 from .link import query
 from .notices import from_query
 from .panel import Change, Panel
@@ -47,10 +47,13 @@ class Browser:
         self.stage = Stage(client)
         self._dress()
         self.script = Script(client.gui, self.report)
-        people = {index: subject.name for index, subject in enumerate(model(DEFAULT.model).subjects, 1)}
-        self.panel = Panel(
-            client.gui, people, self.change, self.act, narrow=self.stage.narrow
-        )
+        people = {
+            index: subject.name for index, subject in enumerate(model(DEFAULT.model).subjects, 1)
+        }
+        self.panel = Panel(client.gui, people, self.change, self.act, narrow=self.stage.narrow)
+        style = figures.STYLE + figures.hidden_boxes(self.panel.widgets.step_sliders)
+        self.panel.places.style.content = style
+        self.panel.show(self.room.state)
         self._command_palette()
 
     # ---------------------------------------------------------------- what a person does, on the loop
@@ -92,7 +95,9 @@ class Browser:
             case "reset":
                 self._travel(history.reset(self._history))
             case "copy_link":
-                self.script.copy(query(self.room.state))  # a link: the script puts the page before it
+                self.script.copy(
+                    query(self.room.state)
+                )  # a link: the script puts the page before it
             case "copy_command":
                 self.script.copy(command(self.room.state))
 
@@ -124,8 +129,8 @@ class Browser:
                 self._dark = report.on
                 self._dress()
             case Copied():
-                words = "copy.done" if report.ok else "copy.by_hand"
-                self._client.add_notification(say("app.title"), say(words), auto_close_seconds=3.0)
+                words = say("copy.done") if report.ok else say("copy.by_hand")
+                self._client.add_notification(say("app.title"), words, auto_close_seconds=3.0)
             case _:
                 pass
 

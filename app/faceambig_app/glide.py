@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 from .fields import FIELDS
 
@@ -55,7 +55,7 @@ class Glide:
             self._task.cancel()
             self._task = None
 
-    async def _run(self, steps: object, seconds: float) -> None:
+    async def _run(self, steps: Iterable[float], seconds: float) -> None:
         for distance in steps:
             self._go(distance)
             await asyncio.sleep(seconds)

@@ -23,6 +23,7 @@ from .stage import FAR, FIRST_FOV, FIRST_POSITION, NEAR
 from .state import DEFAULT
 from .text import say
 
+
 class Page:
     """The server and its rooms."""
 
@@ -32,7 +33,9 @@ class Page:
         self._dispatcher = Dispatcher()
         self._browsers: dict[int, Browser] = {}
         hooks = guard.Hooks(words=refusal, on_refused=self._refused, on_error=self._failed)
-        self._server = guard.start(host, port, keys=("v", *FIELDS), title=say("app.title"), hooks=hooks)
+        self._server = guard.start(
+            host, port, keys=("v", *FIELDS), title=say("app.title"), hooks=hooks
+        )
         # For everybody and before the first browser: a client that learns "up" later keeps its camera's old one
         self._server.scene.set_up_direction("+y")
         self._server.initial_camera.up = (0.0, 1.0, 0.0)

@@ -5,8 +5,9 @@ They know no scene and no fit: what is computed comes in as HTML, into the eleme
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import viser
 
@@ -14,9 +15,8 @@ from ..guard import data_html
 from ..state import ViewState
 from ..text import distance_text, say
 from . import compare, explore, flex, view
-from .widgets import Change, Tell, Widgets
-
-__all__ = ["Change", "Panel", "Tell", "Widgets"]
+from .widgets import Change as Change
+from .widgets import Tell, Widgets
 
 SIDE_WIDTH = 372  # pixels of each docked panel
 
@@ -44,7 +44,7 @@ class Panel:
     def __init__(
         self,
         gui: viser.GuiApi,
-        people: dict[object, str],
+        people: Mapping[Any, str],
         tell: Tell,
         act: Callable[[str], None],
         *,
@@ -54,7 +54,13 @@ class Panel:
         gui.set_panel_label(say("app.title"))
         style = gui.add_html("")
         if narrow:  # one panel: the photograph comes first, beside the numbers
-            heading, picture, marks = gui.add_html(""), gui.add_html(""), gui.add_html("")
+            photo = _photo(gui)
+        else:
+            side = gui.add_panel()
+            with side.add_tab(say("panel.photo")):
+                photo = _photo(gui)
+            side.dock_left()
+            side.set_width(SIDE_WIDTH)
         tabs = gui.add_tab_group()
         with tabs.add_tab(say("panel.explore")):
             explore.build_distance(w)
@@ -70,13 +76,7 @@ class Panel:
         spoken, data = gui.add_html(""), gui.add_html("")
         gui.main_panel.dock_right()
         gui.main_panel.set_width(SIDE_WIDTH)
-        if not narrow:
-            side = gui.add_panel()
-            with side.add_tab(say("panel.photo")):
-                heading, picture, marks = gui.add_html(""), gui.add_html(""), gui.add_html("")
-            side.dock_left()
-            side.set_width(SIDE_WIDTH)
-        self.places = Places(style, heading, picture, marks, cards, plots, legend, words, pins, spoken, data)
+        self.places = Places(style, *photo, cards, plots, legend, words, pins, spoken, data)
 
     @property
     def controls(self) -> tuple[viser.GuiInputHandle, ...]:
@@ -89,5 +89,15 @@ class Panel:
 
     def spoken(self, state: ViewState) -> str:
         """Data for the page's script: buttons that are on, and what a screen reader says for a distance slider."""
-        texts = {say(f"field.{name}"): distance_text(getattr(state, name)) for name in ("distance", "actual")}
+        texts = {
+            say(f"field.{name}"): distance_text(getattr(state, name))
+            for name in ("distance", "actual")
+        }
         return data_html("pressed", self.widgets.pressed(state)) + data_html("valuetext", texts)
+
+
+def _photo(
+    gui: viser.GuiApi,
+) -> tuple[viser.GuiHtmlHandle, viser.GuiHtmlHandle, viser.GuiHtmlHandle]:
+    """The places of the heading, the photograph and the points on it."""
+    return gui.add_html(""), gui.add_html(""), gui.add_html("")

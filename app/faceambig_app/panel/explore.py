@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import viser
 
 from ..fields import FIELDS
@@ -15,10 +18,10 @@ def build_distance(w: Widgets) -> None:
     """The slider that the page is about, and the same in figures."""
     w.distance("distance")
     w.centimetres("distance", "distance_cm")
-    w.actions("field.play", ("glide",))
+    w.actions("play", ("glide",))
 
 
-def build_rest(w: Widgets, people: dict[object, str]) -> None:
+def build_rest(w: Widgets, people: Mapping[Any, str]) -> None:
     """What stands below the numbers and the plots."""
     w.buttons("view", NAMED_VIEWS)
     w.buttons("show", ("both", "overlay", "blink", "difference"))
@@ -46,7 +49,7 @@ def build_data(w: Widgets) -> None:
 
 def build_history(w: Widgets) -> None:
     """The way back, and the way to somebody else."""
-    w.actions("field.history", ("undo", "redo", "reset", "copy_link"))
+    w.actions("history", ("undo", "redo", "reset", "copy_link"))
 
 
 def folder(w: Widgets, name: str) -> viser.GuiFolderHandle:

@@ -12,7 +12,7 @@ from ..text import say
 from .explore import folder
 from .widgets import Change, Widgets
 
-LETTERS = "ABC"
+LETTERS = ("A", "B", "C")
 
 
 def build(w: Widgets) -> viser.GuiHtmlHandle:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from ..state import changed
 from .explore import folder
 from .widgets import Widgets
 
@@ -16,7 +15,7 @@ def build(w: Widgets) -> None:
     w.slider("zoom")
     with folder(w, "overlays"):
         w.names("overlays")
-        w.buttons("error_scale", ("1", "5", "10", "20"))
+        w.buttons("error_scale")
     with folder(w, "hide"):
         w.names("hide")
     with folder(w, "page"):

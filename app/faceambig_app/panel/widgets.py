@@ -7,7 +7,7 @@ number field beside it for exact values.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Coroutine, Sequence
+from collections.abc import Callable, Coroutine, Mapping, Sequence
 from typing import Any
 
 import viser
@@ -101,19 +101,23 @@ class Widgets:
             say(f"field.{name}"), kind(field.low), kind(field.high), kind(field.step), kind(field.low),
             hint=say(f"field.{name}_hint"),
         )  # fmt: skip
-        self.bind(handle, lambda state: getattr(state, name), lambda value: setting(name, kind(value)))
+        self.bind(
+            handle, lambda state: getattr(state, name), lambda value: setting(name, kind(value))
+        )
 
-    def buttons(self, name: str, choices: Sequence[str] | None = None) -> None:
+    def buttons(self, name: str, choices: Sequence[str | int] | None = None) -> None:
         """A row of buttons, one a choice."""
-        choices = FIELDS[name].choices if choices is None else choices
-        by_label = {say(f"{name}.{choice}"): choice for choice in choices}
+        by_label = {
+            say(f"{name}.{choice}"): choice
+            for choice in (FIELDS[name].choices if choices is None else choices)
+        }
         label = say(f"field.{name}")
         handle = self.gui.add_button_group(label, tuple(by_label), hint=say(f"field.{name}_hint"))
         handle.on_click(self.heard(lambda option: setting(name, by_label[option])))
         labels = {choice: option for option, choice in by_label.items()}
         self._pressed[label] = lambda state: labels.get(getattr(state, name), "")
 
-    def dropdown(self, name: str, choices: dict[Any, str]) -> None:
+    def dropdown(self, name: str, choices: Mapping[Any, str]) -> None:
         """A list to choose from: value -> words."""
         values = {words: value for value, words in choices.items()}
         handle = self.gui.add_dropdown(
@@ -123,9 +127,13 @@ class Widgets:
         self.bind(handle, lambda state: choices.get(getattr(state, name), first),
                   lambda words: setting(name, values[words]))  # fmt: skip
 
-    def checkbox(self, label: str, read: Callable[[ViewState], bool], write: Callable[[bool], Change]) -> None:
+    def checkbox(
+        self, label: str, read: Callable[[ViewState], bool], write: Callable[[bool], Change]
+    ) -> None:
         """A tick for something that is on or off; words at field.`label`."""
-        handle = self.gui.add_checkbox(say(f"field.{label}"), False, hint=say(f"field.{label}_hint"))
+        handle = self.gui.add_checkbox(
+            say(f"field.{label}"), False, hint=say(f"field.{label}_hint")
+        )
         self.bind(handle, read, write)
 
     def names(self, name: str) -> None:
@@ -140,9 +148,9 @@ class Widgets:
         return handle
 
     def actions(self, label: str, names: Sequence[str]) -> None:
-        """A row of buttons, one an action."""
+        """A row of buttons, one an action; words at field.`label`."""
         by_label = {say(f"action.{name}"): name for name in names}
-        handle = self.gui.add_button_group(say(label), tuple(by_label))
+        handle = self.gui.add_button_group(say(f"field.{label}"), tuple(by_label))
         handle.on_click(self.acted(lambda option: by_label[option]))
 
     def bind(
@@ -155,7 +163,9 @@ class Widgets:
     def heard(self, write: Callable[[Any], Change]) -> Listener:
         """A listener that says what a person did; what show() writes is not heard."""
 
-        async def listener(event: viser.GuiEvent[Any]) -> None:  # async: on the loop, in message order
+        async def listener(
+            event: viser.GuiEvent[Any],
+        ) -> None:  # async: on the loop, in message order
             if event.client_id is not None:  # None: written by show()
                 self._tell(write(event.target.value))
 
@@ -176,18 +186,18 @@ def setting(name: str, value: Any) -> Change:
     return lambda state: changed(state, **{name: value})
 
 
-def _has(name: str, choice: str) -> Callable[[ViewState], bool]:
+def _has(name: str, choice: object) -> Callable[[ViewState], bool]:
     return lambda state: choice in getattr(state, name)
 
 
-def _with(name: str, choice: str) -> Callable[[bool], Change]:
+def _with(name: str, choice: object) -> Callable[[bool], Change]:
     def write(on: bool) -> Change:
         return lambda state: changed(state, **{name: toggled(getattr(state, name), choice, on)})
 
     return write
 
 
-def toggled(names: tuple[str, ...], choice: str, on: bool) -> tuple[str, ...]:
+def toggled(names: tuple[object, ...], choice: object, on: bool) -> tuple[object, ...]:
     """The names with `choice` in or out."""
     rest = tuple(name for name in names if name != choice)
     return (*rest, choice) if on else rest
