@@ -5,8 +5,11 @@ Photograph and plots have modules of their own and are handed on here: the page 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from html import escape
+
+import numpy as np
+from numpy.typing import NDArray
 
 from faceambig.arrays import Array
 from faceambig.scene import Legend, Numbers, Scene
@@ -37,8 +40,8 @@ def heading(assumed: float | None, actual: float, points: int) -> str:
     return f'<div class="fa"><h1>{title}</h1><p>{escape(lead)}</p><p>{task}</p></div>'
 
 
-def cards(numbers: Numbers, *, hidden: bool = False) -> str:
-    """The two numbers whose disagreement is the lesson; `hidden` until somebody has said what they expect."""
+def cards(numbers: Numbers, *, hide: Collection[str] = ()) -> str:
+    """The two numbers whose disagreement is the lesson. `hide` of Scene: "numbers" both, "truth" the second."""
     warning = ""
     if not numbers.converged:
         warning = say("number.not_converged")
@@ -49,17 +52,15 @@ def cards(numbers: Numbers, *, hidden: bool = False) -> str:
     title, note = say("number.d_s"), say("number.d_s_note")
     if numbers.reference:
         title, note = say("number.d_s_to", reference=numbers.reference), say("number.d_s_to_note")
-    shown = (
-        _card("fa-dl", say("number.d_l"), d_l, "%", say("number.d_l_note"), numbers.eyes_meaning),
-        _card("fa-ds", title, d_s, "mm", note, ""),
-    )
-    if hidden:
-        words = say("number.hidden")
-        shown = (
-            _card("fa-dl", say("number.d_l"), "?", "", words, numbers.eyes_meaning),
-            _card("fa-ds", title, "?", "", words, ""),
-        )
-    return f'<div class="fa"><div class="fa-cards">{"".join(shown)}</div>{warned}</div>'
+    d_l_shown, d_s_shown = "numbers" not in hide, not {"numbers", "truth"} & set(hide)
+    shown = _card(
+        "fa-dl", say("number.d_l"), d_l if d_l_shown else "?", "%" if d_l_shown else "",
+        say("number.d_l_note") if d_l_shown else say("number.hidden"), numbers.eyes_meaning,
+    ) + _card(
+        "fa-ds", title, d_s if d_s_shown else "?", "mm" if d_s_shown else "",
+        note if d_s_shown else say("number.hidden"), "",
+    )  # fmt: skip
+    return f'<div class="fa"><div class="fa-cards">{shown}</div>{warned}</div>'
 
 
 def _card(tone: str, title: str, value: str, unit: str, note: str, hint: str) -> str:
@@ -77,16 +78,19 @@ def flex_words(words: str, low: float, high: float) -> str:
     return f'<div class="fa"><small>{escape(text)}</small></div>'
 
 
-def spoken(numbers: Numbers, *, hidden: bool = False) -> str:
+def spoken(numbers: Numbers, *, hide: Collection[str] = ()) -> str:
     """The result as one sentence for a screen reader; changes once a rest."""
     distance = distance_text(numbers.distance)
-    if hidden:
+    d_l = percent_number(numbers.d_l_percent)
+    if "numbers" in hide:
         sentence = say("number.spoken_hidden", distance=distance)
+    elif "truth" in hide:
+        sentence = say("number.spoken_half", distance=distance, d_l=d_l)
     else:
         sentence = say(
             "number.spoken",
             distance=distance,
-            d_l=percent_number(numbers.d_l_percent),
+            d_l=d_l,
             d_s=f"{numbers.d_s_mm:.1f}",
         )
     return f'<div class="fa-hidden" aria-live="polite">{escape(sentence)}</div>'
@@ -107,7 +111,7 @@ def heads_words(scene: Scene) -> str:
             elevation=f"{abs(view.elevation_deg):.0f}",
             height=say("stage.below") if view.elevation_deg < 0 else say("stage.above"),
         )
-    heads = say("stage.and").join(head.title for head in scene.heads)
+    heads = say("stage.and").join(head.title for head in scene.heads if head.title)
     words = escape(say("stage.alt", heads=heads, place=place))
     return f'<div class="fa-hidden" role="img" aria-label="{words}"></div>'
 
@@ -120,24 +124,23 @@ def legend(scale: Legend) -> str:
         f'<span style="left:{100 * (tick - scale.low) / span:.4g}%">{_signed(tick)}</span>'
         for tick in scale.ticks
     )
-    ends = [(f"&gt; {_signed(scale.high)}", scale.colours[-1])]
-    if scale.low < 0:
-        ends.insert(0, (f"&lt; {_signed(scale.low)}", scale.colours[0]))
-    over = [
-        '<div class="fa-over"><i style="background:#{:02X}{:02X}{:02X}"></i>{}</div>'.format(
-            *colour.tolist(), text
-        )
-        for text, colour in ends
-    ]
+    first, last = scale.colours[0], scale.colours[-1]
+    below = _over(f"&lt; {_signed(scale.low)}", first) if scale.open_low else ""
+    above = _over(f"&gt; {_signed(scale.high)}", last) if scale.open_high else ""
     ramp = f'<div class="fa-ramp" style="background:linear-gradient(90deg,{stops})">{ticks}</div>'
-    both = " fa-signed" if scale.low < 0 else ""
     note = f"<div>{escape(scale.note)}</div>" if scale.note else ""
     words = say("legend.alt", title=scale.title, low=_signed(scale.low), high=_signed(scale.high))
     return (
         f'<div class="fa fa-small" role="img" aria-label="{escape(words)}"><div>{escape(scale.title)}</div>'
-        f'<div class="fa-legend{both}">'
-        f"{''.join([*over[:-1], ramp, over[-1]])}</div>{note}</div>"
+        f'<div class="fa-legend">{below}{ramp}{above}</div>{note}</div>'
     )
+
+
+def _over(words: str, colour: NDArray[np.uint8]) -> str:
+    """What lies beyond an end of the scale: its last colour once more."""
+    red, green, blue = colour.tolist()
+    swatch = f'<i style="background:#{red:02X}{green:02X}{blue:02X}"></i>'
+    return f'<div class="fa-over">{swatch}{words}</div>'
 
 
 def _signed(value: float) -> str:

@@ -119,7 +119,7 @@ class HeadNodes:
         self._root.position = self._offset * sight.board[:, 0]
         self._board.wxyz = wxyz
         lines = 1 + self._wanted.foot.count("\n")
-        at = max(BAR_AT, (MARGIN + LINE * lines) * sight.pixel - sight.above)
+        at = max(BAR_AT, (MARGIN + LINE * lines) * sight.pixel - sight.below)
         self._title.position = (
             0.0,
             min(TITLE_AT, sight.above - (MARGIN + LINE) * sight.pixel),

@@ -5,6 +5,7 @@ Colours are CSS variables of style.STYLE. The same numbers stand in a table that
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from html import escape
 
 import numpy as np
@@ -25,30 +26,32 @@ AUTOMATIC_PERCENT = 5.0  # the gap of points that a program finds
 MOST_ROWS = 25  # of the table
 
 
-def plots(curves: Curves, numbers: Numbers, *, true_shown: bool = True) -> str:
+def plots(curves: Curves, numbers: Numbers, *, hide: Collection[str] = ()) -> str:
     """The curves against the assumed distance, the range that cannot be told apart in words, and a table.
 
-    true_shown: False where the true distance is asked for and must not be read off.
+    `hide` of Scene: "numbers" leaves out words and table, "truth" the curve of d_S, "actual" the line of the true
+    distance.
     """
+    told, true = "numbers" not in hide, "truth" not in hide
     top = d_s_axis(curves, numbers)
     likely = curves.density is not None
     last = LIKELY_BOTTOM if likely else D_S_BOTTOM
     ticks_at = BARS_AT[0] + 7 if likely else D_S_BOTTOM
-    words = escape(_alternative(curves, numbers))
+    words = escape(_alternative(curves, numbers) if told and true else say("plot.alt_hidden"))
     parts = [
         f'<svg class="fa-plot" viewBox="0 0 {WIDTH} {ticks_at + 40}" role="img" aria-label="{words}">',
         *_d_l_plot(curves),
-        *_d_s_plot(curves, numbers, top),
+        *_d_s_plot(curves, numbers, top, true),
         *(_likely_plot(curves) if likely else ()),
         *(_tick(cm, ticks_at) for cm in TICKS_CM),
         f'<text x="{(LEFT + RIGHT) / 2}" y="{ticks_at + 35}" text-anchor="middle">{escape(say("plot.axis"))}</text>',
-        _true_line(curves, last) if true_shown else "",
-        _cursor(numbers, top, last),
+        _true_line(curves, last) if "actual" not in hide else "",
+        _cursor(numbers, top, last, true),
         "</svg>",
     ]
-    below = [interval_words(curves), *([likely_words(curves)] if likely else [])]
+    below = [interval_words(curves), *([likely_words(curves)] if likely else [])] if told else []
     said = "".join(f"<p><small>{escape(text)}</small></p>" for text in below)
-    return f'<div class="fa"><div class="fa-wide">{"".join(parts)}</div>{said}{table(curves)}</div>'
+    return f'<div class="fa"><div class="fa-wide">{"".join(parts)}</div>{said}{table(curves, true) if told else ""}</div>'
 
 
 def d_s_axis(curves: Curves, numbers: Numbers) -> float:
@@ -119,17 +122,19 @@ def _whole(metres: float) -> str:
     return f"{100 * metres:.0f}"
 
 
-def table(curves: Curves) -> str:
+def table(curves: Curves, true: bool = True) -> str:
     """The curves as numbers, folded away; at most MOST_ROWS of them, first and last among them."""
     n = len(curves.distances)
     rows = np.unique(np.linspace(0, n - 1, min(n, MOST_ROWS)).round().astype(int))
-    heads = [say("plot.axis"), say("plot.d_l"), say("plot.d_s")]
+    heads = [say("plot.axis"), say("plot.d_l"), *([say("plot.d_s")] if true else [])]
     likely = curves.density
     if likely is not None:
         heads.append(say("plot.likely_share"))
     body = []
     for row in rows:
-        cells = [percent_number(float(curves.d_l_percent[row])), f"{curves.d_s_mm[row]:.1f}"]
+        cells = [percent_number(float(curves.d_l_percent[row]))]
+        if true:
+            cells.append(f"{curves.d_s_mm[row]:.1f}")
         if likely is not None:
             cells.append(f"{100 * likely[row]:.0f}")
         numbers = "".join(f"<td>{cell}</td>" for cell in cells)
@@ -166,7 +171,7 @@ def _d_l_plot(curves: Curves) -> list[str]:
     ]
 
 
-def _d_s_plot(curves: Curves, numbers: Numbers, top: float) -> list[str]:
+def _d_s_plot(curves: Curves, numbers: Numbers, top: float, true: bool) -> list[str]:
     line = _line(_x(curves.distances), _y(curves.d_s_mm, top, D_S_TOP, D_S_BOTTOM))
     title = (
         say("plot.d_s")
@@ -176,7 +181,9 @@ def _d_s_plot(curves: Curves, numbers: Numbers, top: float) -> list[str]:
     return [
         _title(title, D_S_TOP, "ds"),
         *(_grid(value, top, D_S_TOP, D_S_BOTTOM) for value in range(0, int(top) + 1, 4)),
-        f'<polyline points="{line}" fill="none" stroke="var(--fa-ds)" stroke-width="2.2"/>',
+        f'<polyline points="{line}" fill="none" stroke="var(--fa-ds)" stroke-width="2.2"/>'
+        if true
+        else _note((D_S_TOP + D_S_BOTTOM) / 2, say("number.hidden")),
     ]
 
 
@@ -261,13 +268,15 @@ def _true_line(curves: Curves, last: int) -> str:
     )
 
 
-def _cursor(numbers: Numbers, d_s_top: float, last: int) -> str:
+def _cursor(numbers: Numbers, d_s_top: float, last: int, true: bool) -> str:
     if numbers.distance is None:
         return ""
     x = float(_x(numbers.distance))
     a, b = _d_l(numbers.d_l_percent), _at(numbers.d_s_mm, d_s_top, D_S_TOP, D_S_BOTTOM)
+    square = (
+        f'<rect x="{x - 4.2:.1f}" y="{b - 4.2:.1f}" width="8.4" height="8.4" fill="var(--fa-ds)"/>'
+    )
     return (
         f'<path d="M{x:.1f} {D_L_TOP}V{last}" stroke="var(--fa-ink)" stroke-width="1.6"/>'
-        f'<circle cx="{x:.1f}" cy="{a:.1f}" r="4.5" fill="var(--fa-dl)"/>'
-        f'<rect x="{x - 4.2:.1f}" y="{b - 4.2:.1f}" width="8.4" height="8.4" fill="var(--fa-ds)"/>'
+        f'<circle cx="{x:.1f}" cy="{a:.1f}" r="4.5" fill="var(--fa-dl)"/>{square if true else ""}'
     )

@@ -200,7 +200,7 @@ def _board(scene: Scene, head: Head, sight: Sight) -> Board | None:
     together = [other for other in scene.heads if other.slot == head.slot]
     if together[0].name != head.name:
         return None
-    title = " / ".join(other.title for other in together)
+    title = " / ".join(other.title for other in together if other.title)
     lines = tuple(text for other in together for text, _ in other.caption)
     apart = [abs(other.slot - head.slot) for other in scene.heads if other.slot != head.slot]
     room = min(apart, default=np.inf) / sight.pixel

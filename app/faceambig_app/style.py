@@ -37,9 +37,8 @@ font-variant-numeric:tabular-nums;line-height:1.15;display:block}
 .fa-both .fa{padding-right:0}.fa-both .fa+.fa{padding-right:.75em}.fa-both .fa-cards{grid-template-columns:1fr}
 .fa-bars{list-style:none;margin:.3em 0;padding:0}.fa-bars li{display:grid;grid-template-columns:1fr auto;gap:0 8px}
 .fa-bars i{grid-column:1/3;height:8px;border-radius:2px;background:var(--fa-ds);margin-bottom:4px;min-width:1px}
-.fa-signed{grid-template-columns:auto 1fr auto!important}
-.fa-legend{display:grid;grid-template-columns:1fr auto;gap:0 6px;align-items:start;font-variant-numeric:tabular-nums}
-.fa-ramp{height:14px;position:relative;margin-bottom:20px}
+.fa-legend{display:flex;gap:0 6px;align-items:start;font-variant-numeric:tabular-nums}
+.fa-ramp{flex:1;height:14px;position:relative;margin-bottom:20px}
 .fa-ramp span{position:absolute;top:15px;transform:translateX(-50%)}
 .fa-ramp span:first-child{transform:none}.fa-ramp span:last-child:not(:first-child){transform:translateX(-100%)}
 .fa-over{text-align:center;white-space:nowrap}.fa-over i{display:block;height:14px;min-width:24px}

@@ -43,7 +43,8 @@ class Sight:
 
     board: NDArray[np.float64]  # (3, 3) the viewer's right, up and back as columns
     pixel: float  # metres a pixel, of what stands at the heads
-    above: float  # metres seen above the heads' middle, and at least as many below
+    above: float  # metres seen above the heads' middle
+    below: float  # metres seen below it; on a phone the sheet covers the lower ones
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,10 +70,11 @@ class Viewer:
             0 < client.camera.image_width < PHONE
         )  # viser's panel is a sheet over the scene
         self.narrow = 0 < client.camera.image_width < NARROW  # no room for a second panel
-        self.sight = Sight(np.eye(3), 2 * ZOOM_1 / 800, ZOOM_1)
+        self.sight = Sight(np.eye(3), 2 * ZOOM_1 / 800, ZOOM_1, ZOOM_1)
         self._view: View | Lens | None = None
         self._half_width = 0.0  # metres beside the centre that must be seen
-        self._half = ZOOM_1  # metres seen above and below the centre
+        self._half = ZOOM_1  # metres seen above and below the middle of the canvas
+        self._rise = 0.0  # metres: how far above that middle the heads stand
         self._told: list[Place] = []  # places told that have not come back as a view
         self._timer: asyncio.TimerHandle | None = None
         self._aim = (np.array(FIRST_POSITION), FIRST_FOV)  # where the last look put the viewer
@@ -116,7 +118,8 @@ class Viewer:
         right = np.array([np.cos(azimuth), 0.0, -np.sin(azimuth)])
         up = np.cross(back, right)
         half = self._half = view.half_height * self._wider()
-        centre = -(1 - 2 * PHONE_HEADS_AT) * half * up if self.phone else np.zeros(3)
+        self._rise = view.rise + ((1 - 2 * PHONE_HEADS_AT) * half if self.phone else 0.0)
+        centre = -self._rise * up
         with self._client.atomic():
             # Place before limits: the other way round viser glides there
             camera.up_direction = (0.0, 1.0, 0.0)
@@ -143,7 +146,7 @@ class Viewer:
             camera.look_at = (0.0, -up * lens.distance, -lens.distance)
             camera.fov = 2 * float(np.arctan(tall))
             self._aim = (np.zeros(3), camera.fov)
-            self._half = tall * lens.distance
+            self._half, self._rise = tall * lens.distance, up * lens.distance
             self._see(np.eye(3))
 
     def _wider(self) -> float:
@@ -155,8 +158,8 @@ class Viewer:
 
     def _see(self, board: NDArray[np.float64]) -> None:
         pixel = 2 * self._half / max(1, self._size[1])
-        above = (2 * PHONE_HEADS_AT if self.phone else 1.0) * self._half
-        self.sight = Sight(board, pixel, above)
+        above, below = self._half - self._rise, self._half + self._rise
+        self.sight = Sight(board, pixel, above, min(above, below) if self.phone else below)
         self._moved(self.sight)
 
     async def _turned(self, camera: viser.CameraHandle) -> None:  # async: on the loop, cheap
