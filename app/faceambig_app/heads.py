@@ -20,7 +20,11 @@ from .text import say
 from .viewer import Sight
 
 TITLE_AT, BAR_AT = 0.155, -0.165  # metres above and below the pivot, where that much is seen
-MARGIN, LINE = 14, 15  # pixels: air to the edge of what is seen, a line of words
+MARGIN, LINE, AIR = (
+    14,
+    15,
+    4,
+)  # pixels: to the edge of what is seen, of a line of words, from bar to words
 LETTER, SMALLEST = (
     7.0,
     0.7,
@@ -119,14 +123,14 @@ class HeadNodes:
         self._root.position = self._offset * sight.board[:, 0]
         self._board.wxyz = wxyz
         lines = 1 + self._wanted.foot.count("\n")
-        at = max(BAR_AT, (MARGIN + LINE * lines) * sight.pixel - sight.below)
+        at = max(BAR_AT, END + (MARGIN + LINE * lines) * sight.pixel - sight.below)
         self._title.position = (
             0.0,
             min(TITLE_AT, sight.above - (MARGIN + LINE) * sight.pixel),
             0.0,
         )
         self._bar.position = (0.0, at, 0.0)
-        self._foot.position = (0.0, at - 2 * END, 0.0)
+        self._foot.position = (0.0, at - END - AIR * sight.pixel, 0.0)
 
     def remove(self) -> None:
         """Take the head and all that stands on it out of the scene."""

@@ -51,7 +51,8 @@ def plots(curves: Curves, numbers: Numbers, *, hide: Collection[str] = ()) -> st
     ]
     below = [interval_words(curves), *([likely_words(curves)] if likely else [])] if told else []
     said = "".join(f"<p><small>{escape(text)}</small></p>" for text in below)
-    return f'<div class="fa"><div class="fa-wide">{"".join(parts)}</div>{said}{table(curves, true) if told else ""}</div>'
+    said += table(curves, true) if told else ""
+    return f'<div class="fa"><div class="fa-wide">{"".join(parts)}</div>{said}</div>'
 
 
 def d_s_axis(curves: Curves, numbers: Numbers) -> float:
@@ -183,7 +184,7 @@ def _d_s_plot(curves: Curves, numbers: Numbers, top: float, true: bool) -> list[
         *(_grid(value, top, D_S_TOP, D_S_BOTTOM) for value in range(0, int(top) + 1, 4)),
         f'<polyline points="{line}" fill="none" stroke="var(--fa-ds)" stroke-width="2.2"/>'
         if true
-        else _note((D_S_TOP + D_S_BOTTOM) / 2, say("number.hidden")),
+        else _note((D_S_TOP + D_S_BOTTOM) / 2 + 4, say("number.hidden")),
     ]
 
 
@@ -256,13 +257,19 @@ def _tick(cm: int, at: int) -> str:
     )
 
 
+def _upright(x: float, last: int) -> str:
+    """A line down all plots, with room for their titles."""
+    plots_at = ((D_L_TOP, D_L_BOTTOM), (D_S_TOP, D_S_BOTTOM), (LIKELY_TOP, LIKELY_BOTTOM))
+    return "".join(f"M{x:.1f} {top}V{bottom}" for top, bottom in plots_at if bottom <= last)
+
+
 def _true_line(curves: Curves, last: int) -> str:
     if not NEAREST <= curves.true_distance <= FARTHEST:
         return ""
     x = float(_x(curves.true_distance))
     anchor, shift = ("end", -4) if x > (LEFT + RIGHT) / 2 else ("start", 4)
     return (
-        f'<path d="M{x:.1f} {D_L_TOP}V{last}" stroke="var(--fa-dim)" stroke-dasharray="2 3"/>'
+        f'<path d="{_upright(x, last)}" stroke="var(--fa-dim)" stroke-dasharray="2 3"/>'
         f'<text x="{x + shift:.1f}" y="{D_S_TOP + 10}" text-anchor="{anchor}">'
         f"{escape(say('plot.true', distance=centimetres(curves.true_distance)))}</text>"
     )
@@ -277,6 +284,6 @@ def _cursor(numbers: Numbers, d_s_top: float, last: int, true: bool) -> str:
         f'<rect x="{x - 4.2:.1f}" y="{b - 4.2:.1f}" width="8.4" height="8.4" fill="var(--fa-ds)"/>'
     )
     return (
-        f'<path d="M{x:.1f} {D_L_TOP}V{last}" stroke="var(--fa-ink)" stroke-width="1.6"/>'
+        f'<path d="{_upright(x, last)}" stroke="var(--fa-ink)" stroke-width="1.6"/>'
         f'<circle cx="{x:.1f}" cy="{a:.1f}" r="4.5" fill="var(--fa-dl)"/>{square if true else ""}'
     )

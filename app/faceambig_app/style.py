@@ -18,7 +18,8 @@ _TEXT = """
 .fa-hidden{position:absolute;width:1px;height:1px;overflow:hidden;clip-path:inset(50%)}
 .fa-warn{border-left:4px solid #C8102E;padding-left:8px}
 .fa summary{cursor:pointer;min-height:24px;color:var(--fa-dim);font-size:calc(12.5px*var(--fa-scale,1))}
-.fa table{border-collapse:collapse;font-size:calc(12.5px*var(--fa-scale,1));font-variant-numeric:tabular-nums}
+.fa table{color:var(--fa-ink);border-collapse:collapse;
+font-size:calc(12.5px*var(--fa-scale,1));font-variant-numeric:tabular-nums}
 .fa caption{text-align:left;color:var(--fa-dim)}
 .fa th,.fa td{padding:2px 8px 2px 0;text-align:right;font-weight:400;border-bottom:1px solid var(--fa-line)}
 .fa th{color:var(--fa-dim)}.fa-wide{overflow-x:auto}
@@ -57,7 +58,7 @@ pointer-events:stroke;fill:none}
 .fa-defs{position:absolute;width:0;height:0}
 .fa-key{display:flex;flex-wrap:wrap;gap:0 16px;font-size:calc(12.5px*var(--fa-scale,1));
 color:var(--fa-dim);padding-top:4px}
-.fa-key svg{width:13px;height:13px;vertical-align:-2px;margin-right:4px}
+.fa-key svg{width:calc(13px*var(--fa-scale,1));height:calc(13px*var(--fa-scale,1));vertical-align:-2px;margin-right:4px}
 """
 
 _PLOTS = """
