@@ -8,11 +8,13 @@ from __future__ import annotations
 import logging
 import time
 from asyncio import AbstractEventLoop
+from typing import cast
 
 import viser
 
-from . import figures, guard, history
+from . import figures, guard, history, photograph, plots
 from .actions import ACTIONS
+from .fields import FIELDS
 from .forms import command
 from .glide import Glide
 from .link import query
@@ -20,12 +22,15 @@ from .notices import from_query
 from .panel import Change, Panel
 from .pipeline import Frame, curve_key, curve_of, frame, model, photo_jpeg
 from .room import Dispatcher, Room
-from .script import Copied, Dark, Hello, Key, Report, Script, is_dark
+from .script import Copied, Dark, Hello, Key, Report, Script, Theme, is_dark
 from .stage import Stage
 from .state import DEFAULT, ViewState, changed
+from .style import STYLE, text_size
 from .text import say
 
 log = logging.getLogger("faceambig")
+
+Contents = list[tuple[viser.GuiHtmlHandle, str]]
 
 HELLO = 0.5  # seconds to wait for the page's script to say which state the address asks for
 
@@ -44,14 +49,14 @@ class Browser:
         self._dark = False  # whether this person's system is dark
         self._curves_of: object = None  # what the plots show
         self._picture_of: object = None  # what the photograph shows: (target, draft)
-        self.stage = Stage(client)
+        self.stage = Stage(client, self._orbited)
         self._dress()
         self.script = Script(client.gui, self.report)
         people = {
             index: subject.name for index, subject in enumerate(model(DEFAULT.model).subjects, 1)
         }
         self.panel = Panel(client.gui, people, self.change, self.act, narrow=self.stage.narrow)
-        style = figures.STYLE + figures.hidden_boxes(self.panel.widgets.step_sliders)
+        style = STYLE + figures.hidden_boxes(self.panel.widgets.step_sliders)
         self.panel.places.style.content = style
         self.panel.show(self.room.state)
         self._command_palette()
@@ -110,8 +115,20 @@ class Browser:
         self.room.go(to.now)
         if (before.theme, before.text) != (to.now.theme, to.now.text):
             self._dress()
-            self.script.theme(to.now.theme, to.now.text)
+            self.script.theme(cast(Theme, to.now.theme), to.now.text)
         self.panel.show(to.now)
+
+    def _orbited(self, azimuth: float, elevation: float, zoom: float) -> None:
+        """A hand has turned the viewer, who stands there already: the state learns it, nothing is drawn."""
+        low, high = FIELDS["zoom"].low, FIELDS["zoom"].high
+        self._go(
+            changed(
+                self.room.state,
+                view="free",
+                orbit=(azimuth, elevation),
+                zoom=min(high, max(low, zoom)),
+            )
+        )
 
     def _glided(self, distance: float) -> None:
         self._go(changed(self.room.state, distance=distance, camera="perspective"))
@@ -150,7 +167,7 @@ class Browser:
     def _dress(self) -> None:
         """Light or dark, as the state or the system says."""
         self._client.gui.configure_theme(
-            dark_mode=is_dark(self.room.state.theme, self._dark),
+            dark_mode=is_dark(cast(Theme, self.room.state.theme), self._dark),
             show_logo=False,
             show_share_button=False,
             brand_color=(27, 95, 193),
@@ -198,37 +215,39 @@ class Browser:
         if not draft:
             self._loop.call_soon_threadsafe(self._settle, state)
 
-    def _contents(
-        self, state: ViewState, shown: Frame, draft: bool
-    ) -> list[tuple[viser.GuiHtmlHandle, str]]:
+    def _contents(self, state: ViewState, shown: Frame, draft: bool) -> Contents:
         """What the elements of the panel show of a frame."""
-        at, numbers, key = self.panel.places, shown.scene.numbers, curve_key(state)
-        cards, marks = figures.cards(numbers), figures.photo_marks(shown.scene.photo)
+        at, scene, hide, key = self.panel.places, shown.scene, state.hide, curve_key(state)
+        cards = figures.cards(scene.numbers, hide=hide)
+        marks = photograph.photo_marks(scene.photo, crosses=False, hover=not draft)
+        html: Contents = [(at.crosses, photograph.photo_crosses(scene.photo))]
         if self.stage.narrow:
-            html = [(at.marks, figures.side_by_side(marks, cards))]
+            html.append((at.marks, figures.side_by_side(marks, cards)))
         else:
-            html = [(at.cards, cards), (at.marks, marks)]
+            html += [(at.cards, cards), (at.marks, marks)]
         if not draft or key == self._curves_of:  # a new target's curves cost a sweep: only at rest
-            html.append((at.plots, figures.plots(curve_of(state), numbers)))
+            html.append((at.plots, plots.plots(curve_of(state), scene.numbers, hide=hide)))
             self._curves_of = key
         if (state.target, draft) != self._picture_of and not (
             draft and self._picture_of == (state.target, False)
         ):
-            html.append((at.picture, figures.photo_picture(photo_jpeg(state.target, draft))))
+            html.append((at.picture, photograph.photo_picture(photo_jpeg(state.target, draft))))
             self._picture_of = (state.target, draft)
         if not draft:
             html += self._at_rest(state, shown)
         return html
 
-    def _at_rest(self, state: ViewState, shown: Frame) -> list[tuple[viser.GuiHtmlHandle, str]]:
-        at, numbers = self.panel.places, shown.scene.numbers
+    def _at_rest(self, state: ViewState, shown: Frame) -> Contents:
+        at, scene = self.panel.places, shown.scene
         low, high = shown.flex_reach
-        points = len(shown.scene.photo.observed)
+        points = len(scene.photo.observed)
+        spoken = figures.spoken(scene.numbers, hide=state.hide) + figures.heads_words(scene)
         return [
-            (at.spoken, figures.spoken(numbers)),
-            (at.data, self.panel.spoken(state)),
+            (at.legend, "" if scene.legend is None else figures.legend(scene.legend)),
+            (at.spoken, spoken),
+            (at.data, self.panel.spoken(state) + text_size(state.text)),
             (at.flex, figures.flex_words(shown.flex_words, low, high)),
-            (at.heading, figures.heading(numbers.distance, state.actual, points)),
+            (at.heading, figures.heading(scene.numbers.distance, state.actual, points)),
         ]
 
     def _settle(self, drawn: ViewState) -> None:

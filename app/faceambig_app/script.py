@@ -180,7 +180,9 @@ class Script:
                 log_line(str(error))
             self._warned = True
             return
-        if isinstance(report, Key):  # the page has ended it: else the next data would begin it again
+        if isinstance(
+            report, Key
+        ):  # the page has ended it: else the next data would begin it again
             self.blink(())
         self._heard(report)
 

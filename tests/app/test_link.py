@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from faceambig_app import cli, link
+from faceambig_app.commands import snapshot
 from faceambig_app.forms import command, flags, from_json, rounded, text_of, to_json, value_of
 from faceambig_app.link import Finding, query, to_digits
 from faceambig_app.notices import from_query
@@ -30,7 +31,7 @@ def test_a_state_comes_back_from_link_file_flags_and_pins(state):
     written = to_json(state)
     assert from_json(written) == from_json(written.encode()) == state
     options = PARSER.parse_args(["snapshot", "--out", "a.png", *flags(state)])
-    assert cli.state_of(options) == state
+    assert snapshot.state_of(options) == state
     assert value_of(FIELDS["pins"], text_of(FIELDS["pins"], state.pins)) == tuple(
         changed(pin, model=DEFAULT.model) for pin in state.pins
     )

@@ -17,8 +17,8 @@ from .door import Door, Hooks, ServeError, log_line
 from .hooks import install, opened
 from .messages import MAX_BAD, MAX_MESSAGE
 from .page import PATCHES, make_page, our_script
-from .requests import listen
 from .reports import MAX_REPORT, add_reports
+from .requests import listen
 from .values import TYPING, restate
 
 __all__ = [

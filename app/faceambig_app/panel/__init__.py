@@ -28,6 +28,7 @@ class Places:
     style: viser.GuiHtmlHandle
     heading: viser.GuiHtmlHandle
     picture: viser.GuiHtmlHandle  # the photograph
+    crosses: viser.GuiHtmlHandle  # its points, that seldom change
     marks: viser.GuiHtmlHandle  # the points on it; on narrow windows the numbers stand beside
     cards: viser.GuiHtmlHandle
     plots: viser.GuiHtmlHandle
@@ -96,8 +97,6 @@ class Panel:
         return data_html("pressed", self.widgets.pressed(state)) + data_html("valuetext", texts)
 
 
-def _photo(
-    gui: viser.GuiApi,
-) -> tuple[viser.GuiHtmlHandle, viser.GuiHtmlHandle, viser.GuiHtmlHandle]:
-    """The places of the heading, the photograph and the points on it."""
-    return gui.add_html(""), gui.add_html(""), gui.add_html("")
+def _photo(gui: viser.GuiApi) -> list[viser.GuiHtmlHandle]:
+    """The places of the heading, the photograph, its crosses and its circles."""
+    return [gui.add_html("") for _ in range(4)]
