@@ -21,6 +21,8 @@ import faceambig as fa
 from commands import RECORD, printed, refused, write_pts
 from faceambig.io.schemes import mesh_of_ibug68
 from faceambig_app import cli, pipeline
+from faceambig_app.commands import snapshot as snapshot_command
+from faceambig_app.commands import sweep as sweep_command
 from faceambig_app.forms import command, to_json
 from faceambig_app.state import DEFAULT, FIELDS, ViewState, changed
 from scenes import need_renderer
@@ -239,7 +241,7 @@ def test_sweep_prints_every_fit_and_the_interval(capsys, pts, embedded, observat
     ],
 )
 def test_an_interval_is_a_sentence(interval, words):
-    assert words in cli.interval_words(interval)
+    assert words in sweep_command.interval_words(interval)
 
 
 @pytest.mark.parametrize("command", ["fit", "sweep"])
@@ -393,11 +395,11 @@ def test_a_file_that_is_no_state_is_refused_by_name(capsys, tmp_path, content, w
 def test_the_command_of_a_state_gives_it_back(state, out):
     with pytest.MonkeyPatch.context() as patch:
         calls: list[Any] = []
-        patch.setattr(cli, "run_snapshot", lambda options: calls.append(options) or 0)
+        patch.setattr(snapshot_command, "run", lambda options: calls.append(options) or 0)
         program, *arguments = shlex.split(command(state, out))
         assert program == "faceambig"
         assert cli.main(arguments) == 0
-    assert cli.state_of(calls[0]) == state
+    assert snapshot_command.state_of(calls[0]) == state
     assert calls[0].out == out
 
 
@@ -588,6 +590,15 @@ def test_the_installed_command_says_the_same_as_main(pts):
     bad = run("sweep", str(pts), "--to", "inf")
     assert bad.returncode == 2
     assert bad.stderr.count("\n") == 1
+
+
+def test_help_waits_for_nothing_heavy():
+    code = "import sys, faceambig_app.cli; print(*{name.partition('.')[0] for name in sys.modules})"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = set(run.stdout.split())
+    assert {"argparse", "faceambig_app", "msgspec"} <= loaded
+    heavy = {"numpy", "scipy", "faceambig", "cv2", "PIL", "viser", "pyrender", "trimesh"}
+    assert not loaded & heavy
 
 
 def test_errors_are_put_on_one_line():
