@@ -76,7 +76,10 @@ class HeadNodes:
         self._colours = add_colours(scene, root, shaded(head))
         self._painted: object = head.colours
         self._offset = 0.0  # metres along the viewer's right
-        self._wanted = Board("", 0.0, ())
+        self._wanted: Board | None = Board(head.title, 0.0, (), 0.0)  # no scene's
+        self._placed: object = (
+            None  # what the nodes stand for: viser compares every vector anew, at 50 us each
+        )
 
     def fits(self, head: Head) -> bool:
         """Whether these meshes have the triangles of `head`; else new ones are needed."""
@@ -101,6 +104,9 @@ class HeadNodes:
 
     def write(self, board: Board | None) -> None:
         """The words above and below; None where another head of the slot, or nothing, has them."""
+        if board == self._wanted:
+            return
+        self._wanted = board
         self._board.visible = board is not None
         if board is None:
             return
@@ -109,9 +115,8 @@ class HeadNodes:
         self._title.font_screen_scale = float(np.clip(fits, SMALLEST, 1.0))
         self._foot.visible = bool(board.foot)
         self._bar.visible = board.bar > 0
-        if board.bar > 0 and board.bar != self._wanted.bar:
+        if board.bar > 0:
             self._bar.points = _bar(board.bar)
-        self._wanted = board
 
     def stand(self, offset: float, visible: bool = True) -> None:
         """In the row, `offset` metres along the viewer's right; `place` puts it there."""
@@ -120,7 +125,12 @@ class HeadNodes:
 
     def place(self, sight: Sight, wxyz: NDArray[np.float64]) -> None:
         """Stand along the viewer's right; the board faces the viewer and stays inside what is seen."""
+        if self._placed == (sight, self._offset, self._wanted):
+            return
+        self._placed = (sight, self._offset, self._wanted)
         self._root.position = self._offset * sight.board[:, 0]
+        if self._wanted is None:
+            return
         self._board.wxyz = wxyz
         lines = 1 + self._wanted.foot.count("\n")
         at = max(BAR_AT, END + (MARGIN + LINE * lines) * sight.pixel - sight.below)

@@ -33,6 +33,9 @@ class PointNodes:
         self._discs: viser.PointCloudHandle | None = None
         self._words: list[viser.LabelHandle] = []
         self._points = np.zeros((0, 3))
+        self._sight: Sight | None = None
+        self._named, self._named_in = self._points, self._sight  # what the names stand for
+        self._names: tuple[str, ...] = ()
 
     def show(
         self, marks: Marks, pivot: NDArray[np.float64], sight: Sight, draft: bool, visible: bool
@@ -43,12 +46,18 @@ class PointNodes:
         if not self._frame.visible:
             return
         self.turn(sight)
-        if not draft or len(marks.names) != len(self._words):
+        if draft and len(marks.names) == len(self._words):
+            return
+        same = sight is self._named_in and np.array_equal(self._points, self._named)
+        if not same or marks.names != self._names:
+            self._named, self._named_in, self._names = self._points, sight, marks.names
             self._name(marks.names, sight)
 
     def turn(self, sight: Sight) -> None:
         """Face the viewer, at the size of the screen."""
-        self._frame.position = LIFT.get(self._tone, LIFT["seen"]) * sight.board[:, 2]
+        if sight is not self._sight:
+            self._sight = sight
+            self._frame.position = LIFT.get(self._tone, LIFT["seen"]) * sight.board[:, 2]
         if len(self._points) == 0:
             return
         if self._tone == "seen":

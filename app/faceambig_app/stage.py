@@ -54,6 +54,9 @@ class Stage:
         self._points: dict[tuple[str, str], PointNodes] = {}
         self._lines: dict[tuple[str, str], LineNodes] = {}
         self._blink: viser.GuiHtmlHandle | None = None
+        self._sight: Sight | None = None
+        self._wxyz = np.array([1.0, 0.0, 0.0, 0.0])
+        self._lit = True
         self._light_room()
         self._viewer = Viewer(client, self._place, orbited)
 
@@ -89,7 +92,7 @@ class Stage:
         self._mark(scene, draft)
         self._read_colours(all(head.lit for head in scene.heads))
         self._take_turns(scene)
-        self._place(self._viewer.sight)
+        self._stand(self._viewer.sight)
 
     def _clear(self, scene: Scene) -> None:
         """Take out what the scene no longer has; what has other triangles is made anew."""
@@ -133,13 +136,18 @@ class Stage:
         self._blink.content = data_html("blink", {"nodes": nodes, "seconds": BLINK_SECONDS})
 
     def _place(self, sight: Sight) -> None:
-        """Stand the heads along the viewer's right, with the lights; inside client.atomic(), which is one thread's."""
-        wxyz = quaternion(sight.board)
-        for nodes in self._heads.values():
-            nodes.place(sight, wxyz)
+        """Stand everything as it is now seen; inside client.atomic(), which is one thread's at a time."""
+        self._stand(sight)
         for nodes in self._points.values():
             nodes.turn(sight)
-        self._lights.wxyz = wxyz
+
+    def _stand(self, sight: Sight) -> None:
+        """Stand the heads along the viewer's right, with the lights."""
+        if sight is not self._sight:
+            self._sight, self._wxyz = sight, quaternion(sight.board)
+            self._lights.wxyz = self._wxyz
+        for nodes in self._heads.values():
+            nodes.place(sight, self._wxyz)
 
     def _light_room(self) -> None:
         scene = self._scene
@@ -156,6 +164,9 @@ class Stage:
 
     def _read_colours(self, lit: bool) -> None:
         """Studio light; where a head has the colours of a legend, light in which they can be read."""
+        if lit == self._lit:
+            return
+        self._lit = lit
         self._ambient.intensity = AMBIENT if lit else READ_AMBIENT
         for lamp, (_, _, _, intensity) in zip(self._lamps, LIGHTS, strict=True):
             lamp.intensity = intensity if lit else READ_SHARE * intensity
