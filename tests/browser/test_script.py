@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+import itertools
 import json
 import time
 from collections.abc import Callable, Iterator
@@ -250,7 +251,7 @@ def test_blink_shows_one_at_a_time_in_every_picture(server: Tiny, page: Page) ->
     page.wait_for_timeout(2200)
     drawn = page.evaluate("() => { const d = drawn; window.drawn = null; return d }")
     assert all(one != two for _, one, two in drawn)
-    cuts = [t for (_, a, _), (t, b, _) in zip(drawn, drawn[1:], strict=False) if a != b]
+    cuts = [t for (_, a, _), (t, b, _) in itertools.pairwise(drawn) if a != b]
     assert 3 <= len(cuts) <= 5  # every half second
     server.script.address("distance=0.5")  # other data leave it alone
     page.keyboard.press("Escape")
@@ -332,7 +333,7 @@ def test_reports_of_a_drag_are_fifty_milliseconds_apart(server: Tiny, page: Page
     assert until(lambda: server.of(script.Point) and server.of(script.Point)[-1].done)
     times = page.evaluate("times")
     # The last one does not wait; timers may come a hair early
-    assert all(b - a > 45 for a, b in zip(times[:-1], times[1:-1], strict=False))
+    assert all(b - a > 45 for a, b in itertools.pairwise(times))
     page.mouse.move(0, 0)
 
 

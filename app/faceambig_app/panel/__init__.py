@@ -18,6 +18,10 @@ from . import compare, explore, flex, view
 from .widgets import Change as Change
 from .widgets import Tell, Widgets
 
+Photograph = tuple[
+    viser.GuiHtmlHandle, viser.GuiHtmlHandle, viser.GuiHtmlHandle, viser.GuiHtmlHandle
+]
+
 SIDE_WIDTH = 372  # pixels of each docked panel
 
 
@@ -97,6 +101,6 @@ class Panel:
         return data_html("pressed", self.widgets.pressed(state)) + data_html("valuetext", texts)
 
 
-def _photo(gui: viser.GuiApi) -> list[viser.GuiHtmlHandle]:
+def _photo(gui: viser.GuiApi) -> Photograph:
     """The places of the heading, the photograph, its crosses and its circles."""
-    return [gui.add_html("") for _ in range(4)]
+    return gui.add_html(""), gui.add_html(""), gui.add_html(""), gui.add_html("")
