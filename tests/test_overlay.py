@@ -135,6 +135,69 @@ def test_what_is_not_good_is_said(canvases):
             assert overlapping(canvases[-1]) == []
 
 
+def test_several_modes_are_said_below_each_other(canvases):
+    scene = scenes.scene()
+    flex = (("nose forward, ears back", 4.0), ("jaw wider", -2.5), ("brows up, mouth down", 1.0))
+    numbers = replace(scene.numbers, flex=flex, flex_words=flex[0][0], flex_mm=4.0)
+    for through in (False, True):
+        overlay.draw(replace(scene, numbers=numbers, through_camera=through, note=30 * "words "))
+        words = words_of(canvases[-1])
+        assert [f"{part}: {mm:+.1f}\u2009mm" in words for part, mm in flex] == [True] * 3
+        assert overlapping(canvases[-1]) == []
+
+
+def test_what_is_hidden_is_not_written(canvases):
+    scene = scenes.scene()
+    overlay.draw(replace(scene, hide=frozenset({"truth"})))
+    words = set(words_of(canvases[-1]))
+    assert "0.25" in words
+    assert not words & {"5.3", WORDS["d_s"], WORDS["d_s_axis"]}
+    overlay.draw(replace(scene, hide=frozenset({"numbers"})))
+    assert not set(words_of(canvases[-1])) & {"5.3", "0.25"}
+    unknown = replace(scenes.curves(), true_distance=np.nan)
+    overlay.draw(replace(scene, curves=unknown))
+    assert "true 30" not in words_of(canvases[-1])
+    assert "assumed 120" in words_of(canvases[-1])
+
+
+def test_a_reference_in_place_of_the_true_face_is_named(canvases):
+    scene = scenes.scene()
+    numbers = replace(scene.numbers, reference="the 60 cm fit")
+    overlay.draw(replace(scene, numbers=numbers))
+    written = " ".join(words_of(canvases[-1]))
+    assert "mean distance to the 60 cm fit" in written
+    assert WORDS["d_s_note"] not in written
+
+
+@pytest.mark.parametrize("strip", [False, True])
+def test_open_ends_of_a_scale_are_written_at_its_bar(canvases, strip):
+    scale = replace(scenes.legend(), low=-15.0, ticks=(-15.0, -5.0, 5.0, 15.0), open_low=True)
+    scene = replace(scenes.strip() if strip else scenes.scene(), legend=scale)
+    overlay.draw(scene)
+    assert {"<\u2009\u221215", "\u22125", "5", "15"} <= set(words_of(canvases[-1]))
+    overlay.draw(replace(scene, legend=replace(scale, open_high=True)))
+    assert ">\u200915" in words_of(canvases[-1])
+    assert overlapping(canvases[-1]) == []
+
+
+@pytest.mark.parametrize("distance", [0.2, 0.3, 3.0, None])
+@pytest.mark.parametrize("hide", [(), ("truth",)])
+def test_a_density_is_a_plot_of_its_own_below_the_others(canvases, distance, hide):
+    sweep = scenes.curves()
+    told = replace(
+        sweep, density=1.0 / sweep.distances / 5.0, intervals=((0.2, np.inf),), beyond=0.4
+    )
+    numbers = replace(scenes.scene().numbers, converged=False)
+    scene = replace(scenes.scene(distance, curves=told, hide=frozenset(hide)), numbers=numbers)
+    overlay.draw(scene)
+    assert {WORDS["density"], "40\u2009% farther"} <= set(words_of(canvases[-1]))
+    assert overlapping(canvases[-1]) == []
+    high = plots.height(told, hide) - plots.height(sweep, hide)
+    assert high == plots.DENSITY_ROOM
+    bottom = max(y + tall for _, _, y, _, tall in canvases[-1].boxes)
+    assert bottom <= canvases[-1].room[1]
+
+
 def test_words_can_be_replaced(canvases):
     overlay.draw(scenes.scene(), words={"d_l": "Abstand der Punkte"})
     assert "Abstand der Punkte" in words_of(canvases[0])
