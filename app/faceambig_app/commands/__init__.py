@@ -1,0 +1,20 @@
+"""The commands of faceambig, one module each: `add` gives a command its flags, `run` does it and returns the status.
+
+Everything heavy is imported inside `run`: --help and a mistyped flag do not wait for NumPy.
+"""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+from . import fit, landmarks, models, serve, snapshot, sweep
+
+# The order of the help
+COMMANDS: tuple[tuple[str, ModuleType, str], ...] = (
+    ("serve", serve, "open the page on this machine"),
+    ("snapshot", snapshot, "draw the page's picture of a state, without a browser"),
+    ("fit", fit, "fit a face to the points of a photograph"),
+    ("sweep", sweep, "fit at many distances"),
+    ("landmarks", landmarks, "find the points of a face in a photograph"),
+    ("models", models, "what a model holds: modes, landmark schemes"),
+)
