@@ -19,11 +19,7 @@ CROSS, DISC = 4.5, 8.0  # pixels: half a cross, a whole disc
 LARGEST = {"seen": 0.0034, "d_l": 0.006}  # metres: on a phone, where heads are small, marks are too
 LIFT = {"d_l": 0.002, "seen": 0.003}  # metres towards the viewer: crosses over discs
 BESIDE = 6.0  # pixels from a point to its name
-NAME_LARGEST = {
-    "seen": 0.0034,
-    "d_l": 0.006,
-}  # metres: on a phone, where heads are small, marks are too
-LIFT = 0.015  # metres more: a name is wide, and the cheek beside it may be nearer
+NAME_LIFT = 0.015  # metres more: a name is wide, and the cheek beside it may be nearer
 NAME_SCALE = 0.8  # of viser's 12 pixels
 
 
