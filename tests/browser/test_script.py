@@ -190,11 +190,12 @@ def test_theme_and_text_live_and_kept(server: Tiny, visit: Callable[..., Page]) 
     page = visit(color_scheme="dark")
     scheme = "() => document.documentElement.dataset.mantineColorScheme"
     gui = server.made["slider"]._impl.gui_api
-    for theme, seen in (
+    steps: list[tuple[script.Theme, str]] = [
         ("auto", "dark"),
         ("light", "light"),
         ("dark", "dark"),
-    ):  # as a server follows
+    ]
+    for theme, seen in steps:  # as a server follows
         server.script.theme(theme)
         gui.configure_theme(dark_mode=script.is_dark(theme, server.of(script.Hello)[0].dark))
         page.wait_for_function(f"() => ({scheme})() === '{seen}'", timeout=PATIENCE)
