@@ -22,8 +22,8 @@ from .text import centimetres, percent_number, say
 
 Pixels = NDArray[np.uint8]
 Reference = Literal["true", "best", "saved"]  # the face that those of a sweep are compared with
-SWEEP, POSTERIOR = (960, 720), (1480, 760)  # pixels
-HEADS = 520  # pixels, of the posterior's: the heat map
+SWEEP, POSTERIOR = (960, 720), (1580, 760)  # pixels
+HEADS = 620  # pixels, of the posterior's: the heat map
 CELL = 250  # pixels, of a face in a row
 MARGIN = 28
 ACROSS = 0.29  # metres: a head from the side
@@ -132,12 +132,8 @@ def posterior_sheet(
     canvas.text(MARGIN, MARGIN + 12, say("sheet.posterior"), 19, INK, 650)
     line = MARGIN + 42
     for each, colour in zip(intervals, charts.WITHIN, strict=True):
-        high = say("sheet.no_end") if each.high is None else centimetres(each.high)
-        said = say(
-            "sheet.interval", level=f"{100 * each.level:g}", low=centimetres(each.low), high=high
-        )
+        canvas.text(MARGIN + 24, line, _interval(each), 15, INK)
         canvas.fill(MARGIN, line - 12, 15, 15, colour)
-        canvas.text(MARGIN + 24, line, said, 15, INK)
         line += 25
     charts.density(
         canvas, density.distances, np.log(2.0) * density.density, ends, density.beyond, words,
@@ -229,6 +225,13 @@ def _legend(title: str, most: float) -> Legend:
     )
 
 
+def _interval(each: fa.DistanceInterval) -> str:
+    level, low = f"{100 * each.level:g}", centimetres(each.low)
+    if each.high is None:
+        return say("sheet.open", level=level, low=low)
+    return say("sheet.interval", level=level, low=low, high=centimetres(each.high))
+
+
 def _error(d_l_percent: float) -> str:
     return say("sheet.landmarks", percent=percent_number(d_l_percent))
 
@@ -238,7 +241,7 @@ def _true(metres: float) -> str:
 
 
 def _signed(value: float) -> str:
-    return f"{value:+.3g}".replace("-", "\u2212")
+    return f"{value:+.2g}".replace("-", "\u2212")
 
 
 def _opaque(canvas: Canvas) -> Pixels:

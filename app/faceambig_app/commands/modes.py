@@ -171,12 +171,13 @@ def _flexible(options: argparse.Namespace, fit: fa.Fit) -> Result:
     import faceambig as fa
     from faceambig.flex import count_of, plausible_limit
 
+    k1, k2 = _k1(options.k1), _k2(options.k2)  # before the work
     count = count_of(fit, 3 if options.count is None else options.count)
     modes = fa.flexibility_modes(
         fit.model, fit, None, linearisation=AT[options.at or "reprojection"], pose=options.pose or "fixed",
         free_distance=options.free_distance,
     )  # fmt: skip
-    kept = modes.truncated(2.0 if options.k1 is None else options.k1, **_k2(options.k2))
+    kept = modes.truncated(k1, **k2)
     limit = plausible_limit(len(fit.alpha))
     result = Result()
     result.header = (
@@ -227,17 +228,27 @@ def _reached(
         yield k, high
 
 
+def _k1(mm: float | None) -> float:
+    """Millimetres of the truncation; ValueError unless positive."""
+    if mm is not None and not 0 < mm < float("inf"):
+        raise ValueError(f"--k1: {mm:g} mm is not above 0 and finite")
+    return 2.0 if mm is None else mm
+
+
 def _k2(text: str | None) -> dict[str, float]:
     """Keyword of `truncated`: pixels, or percent of the interocular distance where the text ends so."""
     if text is None:
         return {}
     name = "landmark_percent" if text.endswith("%") else "landmark_px"
     try:
-        return {name: float(text.removesuffix("%"))}
+        value = float(text.removesuffix("%"))
     except ValueError as error:
         raise ValueError(
             f"--k2: {text!r:.40} is not a number of pixels, or of percent as in 1%"
         ) from error
+    if not 0 < value < float("inf"):
+        raise ValueError(f"--k2: {text!r:.40} is not above 0 and finite")
+    return {name: value}
 
 
 def _mode_record(

@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
+from ..state import FIELDS, check, parse
 from .inputs import Start, add_fitting, add_input, fitting, start_of
 from .progress import Progress
 from .shared import (
@@ -60,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
     import faceambig as fa
 
     csv, plot = outputs_of(options)
-    out = _folder(options)
+    out, _ = _folder(options), _seed(options)
     distances = distances_of(options, least=2)
     start = start_of(options)
     between = options.between
@@ -114,6 +115,14 @@ def _folder(options: argparse.Namespace) -> Path | None:
     from ..photo import folder
 
     return folder(options.out, ())
+
+
+def _seed(options: argparse.Namespace) -> int:
+    """Of the draws, and of the noise of a subject."""
+    field = FIELDS["seed"]
+    value = 0 if options.seed is None else parse(field, options.seed)
+    check(field, value)
+    return value
 
 
 def _assumed(options: argparse.Namespace, start: Start) -> dict[str, Any]:
@@ -232,7 +241,7 @@ def _draws(
 
     from ..photo import face_meshes
 
-    seed = 0 if options.seed is None else int(options.seed)
+    seed = _seed(options)
     drawn = found.sample(options.draws, seed)
     digits = len(str(len(drawn)))
     names = [f"draw_{k:0{digits}}" for k in range(1, len(drawn) + 1)]
