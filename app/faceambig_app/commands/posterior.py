@@ -206,7 +206,7 @@ def _lines(found: fa.Posterior, spread: Mapping[str, Any], prior: str) -> Iterat
     options = found.sweep.orthographic.options
     box = "no box" if options.box is None else f"box {options.box:g} sd"
     yield (
-        f"landmark noise: {found.sigma_px:.2f} px per coordinate, what modes left out cause in it; "
+        f"landmark noise: {found.sigma_px:.2f} px per coordinate, with what modes left out would cause; "
         f"{options.modes} modes, {box}"
     )
     where = "" if spread["max_region"] is None else f", at the {spread['max_region']}"
