@@ -68,7 +68,7 @@ def faces_sheet(fit: fa.Fit, faces: Sequence[Bent], note: str) -> Pixels:
                 slot=slots[k], caption=tuple(caption), lit=False,
             )
         )  # fmt: skip
-    scene = _scene(fit, heads, _legend(say("sheet.legend"), most), note)
+    scene = _scene(fit, heads, _legend(say("sheet.legend"), most, model.evaluation is None), note)
     return draw(scene, max(1600, CELL * len(heads) + 200), 760)
 
 
@@ -162,7 +162,7 @@ def _spread(canvas: Canvas, found: fa.Posterior, sd_mm: Array, x: float) -> None
         middle = gl.viewer_rotation(view) @ pivot(model)
         drawn = gl.render_head(face, view, *size, ppm, middle=(middle[0], middle[1]))
         canvas.paste(x + k * size[0], top, drawn)
-    legend, y = _legend(say("sheet.legend_sd"), most), top + size[1] + 42
+    legend, y = _legend(say("sheet.legend_sd"), most, model.evaluation is None), top + size[1] + 42
     canvas.text(x, y - 14, legend.title, 13, DIM)
     canvas.ramp(x, y - 5, 300, 14, legend.colours, upright=False)
     for tick in legend.ticks:
@@ -214,14 +214,14 @@ def _scale_end(mm: float) -> float:
     return float(power * next(step for step in (1, 1.5, 2, 3, 4, 6, 8, 10) if step * power >= mm))
 
 
-def _legend(title: str, most: float) -> Legend:
+def _legend(title: str, most: float, everywhere: bool) -> Legend:
     return Legend(
         title=title,
         colours=scale_colours(np.linspace(0.0, 1.0, 64)),
         low=0.0,
         high=most,
         ticks=tuple(round(share * most, 6) for share in (0.0, 0.5, 1.0)),
-        note=say("legend.unmeasured"),
+        note="" if everywhere else say("legend.unmeasured"),
     )
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..state import DEFAULT, FIELDS, check, parse
+from ..forms import value_of
+from ..state import DEFAULT, FIELDS, changed
 from .shared import notes_of
-from .snapshot import HELP
+from .snapshot import field_help
 
 if TYPE_CHECKING:
     import faceambig as fa
@@ -51,20 +52,10 @@ def add_input(command: argparse.ArgumentParser, *, shared: tuple[str, ...] = ())
         "--model", help="model name or path (default embedded, or that of a fit.json)"
     )
     people = command.add_argument_group("instead of FILE")
-    people.add_argument("--subject", metavar="N", help=HELP["subject"])
-    for name in OF_SUBJECT:
+    for name in ("subject", *OF_SUBJECT):
         field = FIELDS[name]
-        about = (
-            f" [{', '.join(field.choices)}]"
-            if field.choices
-            else f" [{field.low:g} to {field.high:g}]"
-        )
         also = "; and of what is drawn" if name in shared else ""
-        people.add_argument(
-            field.flag,
-            metavar=name.upper(),
-            help=f"{HELP[name]}{also}{about} (default {getattr(DEFAULT, name)})",
-        )
+        people.add_argument(field.flag, metavar=name.upper(), help=field_help(field) + also)
     command.set_defaults(shared=shared)
 
 
@@ -168,12 +159,10 @@ def _refuse(options: argparse.Namespace, names: Any, why: str) -> None:
 def _synthetic(options: argparse.Namespace, pixels: bool) -> Start:
     """A subject's photograph, as the page takes it."""
     given = {name: getattr(options, name) for name in ("subject", *OF_SUBJECT)}
-    values: dict[str, Any] = {
-        name: parse(FIELDS[name], text) for name, text in given.items() if text is not None
+    values = {
+        name: value_of(FIELDS[name], text) for name, text in given.items() if text is not None
     }
-    for name, value in values.items():
-        check(FIELDS[name], value)
-    target = DEFAULT.target._replace(model=options.model or DEFAULT.model, **values)
+    target = changed(DEFAULT, model=options.model or DEFAULT.model, **values).target
 
     from .. import pipeline
 

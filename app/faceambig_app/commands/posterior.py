@@ -6,7 +6,8 @@ import argparse
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
-from ..state import FIELDS, check, parse
+from ..forms import value_of
+from ..state import DEFAULT, FIELDS, changed
 from .inputs import Start, add_fitting, add_input, fitting, start_of
 from .progress import Progress
 from .shared import (
@@ -119,10 +120,9 @@ def _folder(options: argparse.Namespace) -> Path | None:
 
 def _seed(options: argparse.Namespace) -> int:
     """Of the draws, and of the noise of a subject."""
-    field = FIELDS["seed"]
-    value = 0 if options.seed is None else parse(field, options.seed)
-    check(field, value)
-    return value
+    if options.seed is None:
+        return DEFAULT.seed
+    return changed(DEFAULT, seed=value_of(FIELDS["seed"], options.seed)).seed
 
 
 def _assumed(options: argparse.Namespace, start: Start) -> dict[str, Any]:
