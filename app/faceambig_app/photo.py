@@ -246,7 +246,7 @@ def face_meshes(
 def write_folder(
     path: Path, files: Iterable[tuple[str, bytes]], beside: Mapping[Path, bytes] | None = None
 ) -> None:
-    """All files, by name, into the folder `path`, and those `beside` it; or none and no folder. ValueError says why.
+    """All files, by name, into the folder `path`, and those `beside` it; or none and no folder: ValueError says why.
 
     They are taken one after the other: a thousand meshes need not be in memory together.
     """

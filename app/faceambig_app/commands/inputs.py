@@ -5,10 +5,11 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from ..fields import canonical
 from ..forms import value_of
-from ..state import DEFAULT, FIELDS, changed
+from ..state import DEFAULT, FIELDS
 from .shared import notes_of
-from .snapshot import field_help
+from .snapshot import help_of
 
 if TYPE_CHECKING:
     import faceambig as fa
@@ -52,10 +53,15 @@ def add_input(command: argparse.ArgumentParser, *, shared: tuple[str, ...] = ())
         "--model", help="model name or path (default embedded, or that of a fit.json)"
     )
     people = command.add_argument_group("instead of FILE")
-    for name in ("subject", *OF_SUBJECT):
+    people.add_argument("--subject", metavar="N", help=help_of(FIELDS["subject"]))
+    for name in OF_SUBJECT:
         field = FIELDS[name]
         also = "; and of what is drawn" if name in shared else ""
-        people.add_argument(field.flag, metavar=name.upper(), help=field_help(field) + also)
+        people.add_argument(
+            field.flag,
+            metavar=name.upper(),
+            help=help_of(field, also),
+        )
     command.set_defaults(shared=shared)
 
 
@@ -159,10 +165,12 @@ def _refuse(options: argparse.Namespace, names: Any, why: str) -> None:
 def _synthetic(options: argparse.Namespace, pixels: bool) -> Start:
     """A subject's photograph, as the page takes it."""
     given = {name: getattr(options, name) for name in ("subject", *OF_SUBJECT)}
-    values = {
-        name: value_of(FIELDS[name], text) for name, text in given.items() if text is not None
+    values: dict[str, Any] = {
+        name: canonical(FIELDS[name], value_of(FIELDS[name], text))
+        for name, text in given.items()
+        if text is not None
     }
-    target = changed(DEFAULT, model=options.model or DEFAULT.model, **values).target
+    target = DEFAULT.target._replace(model=options.model or DEFAULT.model, **values)
 
     from .. import pipeline
 
