@@ -1,0 +1,116 @@
+"""Track: a face on its way, along the distance that its fit assumes or along a flexibility mode.
+
+What an animation and the standalone page move through. Every stop is a fit of its own, measured as the page measures
+it, so what is shown at a stop is what the page shows there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+import faceambig as fa
+from faceambig.arrays import Array
+from faceambig.compose import Face, compose, measure
+from faceambig.flex import FlexibilityModes, plausible_limit
+from faceambig.scene import Scene
+
+from . import pipeline
+from .state import FIELDS, Bend, Fitting, Target, ViewState, changed
+from .text import say
+
+MODES = 3  # flexibility modes on offer: A, B, C
+SWING_MM = 10.0  # of mean surface change to either side: the paper's figures of modes
+LETTERS = "ABC"
+NEAREST, FARTHEST = FIELDS["distance"].low, FIELDS["distance"].high  # metres
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Track:
+    """Stops on a way, in order. F stops."""
+
+    mode: int  # flexibility mode, 1 to MODES; 0: the distance
+    places: Array  # (F,) metres assumed, or millimetres along the mode; ascending
+    faces: tuple[Face, ...]  # F
+    words: str = ""  # what the mode moves
+
+    @property
+    def name(self) -> str:
+        """distance, mode1, ..."""
+        return f"mode{self.mode}" if self.mode else "distance"
+
+
+def distances(low: float, high: float, count: int, through: Sequence[float] = ()) -> Array:
+    """(F,) metres from low to high, evenly in ratio, three digits each; with those of `through` between them."""
+    even = [float(f"{d:.3g}") for d in np.geomspace(low, high, count)]
+    kept = [float(d) for d in through if low <= d <= high]
+    # A stop of ours beside one asked for would be a step of nothing
+    near = 0.4 * np.log(high / low) / max(1, count - 1)
+    even[1:-1] = [d for d in even[1:-1] if all(abs(np.log(d / k)) > near for k in kept)]
+    return np.array(sorted({low, high, *even[1:-1], *kept}))
+
+
+def distance_track(state: ViewState, metres: Array) -> Track:
+    """The fits that assume `metres` (F,), ascending; of the far-away camera's state too."""
+    target, fitting = state.target, state.fitting
+    faces = [
+        pipeline.face(target, fitting._replace(distance=float(d)), state.bend) for d in metres
+    ]
+    return Track(0, metres, tuple(faces))
+
+
+def mode_track(state: ViewState, mode: int, millimetres: Array) -> Track:
+    """The state's fit bent by `millimetres` (F,), ascending, along flexibility mode `mode`, from 1."""
+    if not 1 <= mode <= MODES:
+        raise ValueError(f"mode: {mode} is not within 1 to {MODES}")
+    modes = bending(state.target, state.fitting)
+    faces = [bent(state.target, state.fitting, mode, float(mm)) for mm in millimetres]
+    return Track(mode, millimetres, tuple(faces), modes.words[mode - 1])
+
+
+@lru_cache(maxsize=16)
+def bending(target: Target, fitting: Fitting) -> FlexibilityModes:
+    """The MODES most flexible modes of a fit."""
+    fit = pipeline.fitted(target, fitting)
+    return fa.flexibility_modes(fit.model, fit, count=MODES)
+
+
+def bent(target: Target, fitting: Fitting, mode: int, mm: float) -> Face:
+    """The fit of a target bent by `mm` along mode `mode`, from 1, measured; 0 mm: the fit itself."""
+    if mm == 0:
+        return pipeline.face(target, fitting, Bend(0.0))
+    fit, modes = pipeline.fitted(target, fitting), bending(target, fitting)
+    return measure(
+        pipeline.photograph(target).subject,
+        fit,
+        mm * modes.directions[mode - 1],
+        # As on the page: a fit that is beyond the limit by itself is not blamed on the bend
+        limit=max(plausible_limit(len(fit.alpha)), float(np.linalg.norm(fit.alpha))),
+        flex_words=modes.words[mode - 1],
+        flex_mm=mm,
+    )
+
+
+def scene_of(state: ViewState, track: Track, stop: int) -> Scene:
+    """The page's picture of a stop."""
+    state = changed(state, show="both")
+    if not track.mode:
+        return pipeline.frame(
+            changed(state, camera="perspective", distance=float(track.places[stop]))
+        ).scene
+    base = pipeline.frame(state).scene
+    scene = compose(
+        pipeline.photograph(state.target).subject,
+        track.faces[stop],
+        pipeline.picture(state.target),
+        titles=(base.heads[0].title, base.heads[1].title),
+        view=state.view,
+        surface=state.surface,
+        curve=base.curves,
+        legend_words=(say("legend.difference"), say("legend.unmeasured")),
+        note=base.note,
+    )
+    return replace(base, heads=scene.heads, photo=scene.photo, numbers=scene.numbers)
