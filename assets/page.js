@@ -1,5 +1,5 @@
 // Our part of the page: stands before viser's script, mends its keys and names, and colours the vertices of meshes.
-// Data come in hidden elements, <div hidden data-faceambig="kind" ...> (guard.py writes them); nothing is evaluated.
+// Data come in hidden elements, <div hidden data-faceambig="kind" ...> (guard/data.py writes them); nothing is evaluated.
 // It leans on names of viser 1.1.1: window.__viserMutable and the shape of a labelled row of its panel.
 (() => {
   "use strict";

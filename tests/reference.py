@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -134,39 +133,6 @@ def traced(
             hit &= along < 1
         lead[i] = (-way[2] * along[hit]).max(initial=0.0)
     return lead
-
-
-def metropolis(
-    log_density: Callable[[np.ndarray], np.ndarray],
-    start: np.ndarray,
-    *,
-    steps: int,
-    burn_in: int,
-    thin: int,
-    seed: int,
-) -> np.ndarray:
-    """Draws (n, d) by random-walk Metropolis of many chains side by side, from `start` (chains, d).
-
-    During burn_in the proposal is learnt: the chains' own covariance, and a length that accepts a quarter. After it
-    nothing is changed any more, so what is kept comes from a Markov chain of log_density: (chains, d) -> (chains,).
-    """
-    rng = np.random.default_rng(seed)
-    x, at = start.copy(), log_density(start)
-    chains, d = x.shape
-    factor, length, kept, accepted = np.diag(x.std(axis=0)), 2.38 / np.sqrt(d), [], 0.0
-    for step in range(burn_in + steps):
-        if step < burn_in and step % 100 == 99:
-            factor = np.linalg.cholesky(np.cov(x.T) + 1e-12 * np.diag(x.var(axis=0)))
-            length *= np.exp(accepted / 100 - 0.25)
-            accepted = 0.0
-        new = x + length * rng.standard_normal((chains, d)) @ factor.T
-        there = log_density(new)
-        take = np.log(rng.random(chains)) < there - at
-        x, at = np.where(take[:, None], new, x), np.where(take, there, at)
-        accepted += take.mean()
-        if step >= burn_in and step % thin == 0:
-            kept.append(x)
-    return np.concatenate(kept)
 
 
 def log_posterior(

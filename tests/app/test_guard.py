@@ -512,7 +512,7 @@ def test_errors_of_handlers_are_told_and_logged_in_a_line(
 
 
 def test_the_log_is_one_line_whatever_is_in_it(caplog: pytest.LogCaptureFixture) -> None:
-    guard._say("a\nb\x1b[31m" + "c" * 999)
+    guard.log_line("a\nb\x1b[31m" + "c" * 999)
     assert caplog.messages[0].startswith("page: a\\nb\\x1b[31mccc")
     assert len(caplog.messages[0]) < 260
 

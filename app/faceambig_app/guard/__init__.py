@@ -1,0 +1,63 @@
+"""Every hook into viser's internals: one page from memory, checked requests and values, errors in words.
+
+viser is pinned: the hooks name private parts, and `start` refuses any other version. They act on servers made by
+`start` alone; which server a piece of code serves is found in the context that each connection runs in. In the page
+`assets/page.js` stands before viser's script; its data come through hidden elements (`data_html`) and, for colours,
+a hidden cloud of points (`add_colours`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import viser
+
+from faceambig.io import asset_path
+
+from .data import add_colours, data_html
+from .door import Door, Hooks, ServeError, log_line
+from .hooks import install, opened
+from .messages import MAX_BAD, MAX_MESSAGE
+from .page import PATCHES, make_page
+from .requests import listen
+from .values import TYPING, restate
+
+__all__ = [
+    "MAX_BAD", "MAX_MESSAGE", "PATCHES", "TYPING", "Hooks", "ServeError", "add_colours", "data_html", "log_line",
+    "restate", "start",
+]  # fmt: skip
+
+
+def start(
+    host: str = "127.0.0.1",
+    port: int = 8080,
+    *,
+    keys: Collection[str] = (),
+    title: str = "faceambig",
+    hooks: Hooks | None = None,
+    script: str | None = None,
+    patches: Sequence[tuple[str, str]] | None = None,
+) -> viser.ViserServer:
+    """A viser server on an address of this machine; port 0 takes a free one (`get_port`). Prints nothing.
+
+    `keys` are the names that may stand in the page's address beside those of viser that do no harm. `script` and
+    `patches` replace our script and our mends of viser's bundle; tests show with them what happens without.
+    """
+    install()
+    page = make_page(
+        script if script is not None else asset_path("page.js").read_text(encoding="utf-8"),
+        title,
+        PATCHES if patches is None else patches,
+    )
+    listener = listen(host, port)
+    address, port = listener.getsockname()[:2]
+    names = {"localhost", f"[{address}]" if ":" in address else address}
+    door = Door(
+        listener,
+        port,
+        frozenset(f"{name}:{port}" for name in names) | (names if port == 80 else frozenset()),
+        frozenset(keys) | {"darkMode", "fixedDpr"},
+        page,
+        hooks or Hooks(),
+    )
+    return opened(door, address, title)

@@ -1,0 +1,179 @@
+"""The hooks: where viser's own parts are replaced by ours, once, for all servers of ours."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import re
+import sys
+import threading
+import types
+from collections.abc import Awaitable, Callable, Sequence
+from typing import Any
+
+import viser
+import websockets.asyncio.server
+from viser import _client_autobuild, _gui_api, _gui_handles, _scene_api, _viser
+from viser.infra import _infra
+
+from .door import DOOR, VISER, Door, ServeError, log_line
+from .messages import MAX_MESSAGE, consume, dispatch
+from .requests import answer, dress
+from .values import update
+
+QUIET = logging.getLogger(f"{__package__}.websockets")  # its news is scanners and closed laptops
+QUIET.disabled = True
+
+_opening: Door | None = None
+_opening_one = threading.Lock()
+_installed = False
+
+_real_serve = websockets.asyncio.server.serve
+
+
+def opened(door: Door, address: str, title: str) -> viser.ViserServer:
+    """A viser server behind a door of ours: viser calls our `serve`, which finds the door."""
+    global _opening
+    with _opening_one:
+        _opening = door
+        try:
+            server = viser.ViserServer(address, door.port, label=title, verbose=False)
+        finally:
+            _opening = None
+    _name_failures(server, door)
+    return server
+
+
+def install() -> None:
+    """Put the hooks in place, once; refuse another viser."""
+    global _installed
+    if viser.__version__ != VISER:
+        raise ServeError(
+            f"viser {viser.__version__}: the page needs {VISER}: pip install viser=={VISER}"
+        )
+    if _installed:
+        return
+    doors = types.SimpleNamespace(
+        asyncio=types.SimpleNamespace(
+            server=types.SimpleNamespace(
+                serve=_serve, ServerConnection=websockets.asyncio.server.ServerConnection
+            )
+        ),
+        exceptions=websockets.exceptions,
+        datastructures=websockets.datastructures,
+    )
+    hooks: list[tuple[Any, str, Any]] = [
+        (_infra, "websockets", doors),
+        (_infra, "_message_consumer", consume),
+        (_infra.WebsockMessageHandler, "_handle_incoming_message", dispatch),
+        (_gui_api.GuiApi, "_handle_gui_updates", update),
+        (_viser, "ViserTunnel", _NoTunnel),
+        (_client_autobuild, "ensure_client_is_built", lambda: None),  # it would call npm
+    ]
+    reports = ("print_threadpool_errors", _future_failed), ("print_task_error", _future_failed)
+    reports += (("print_awaited_callback_error", _callback_failed),)
+    modules = (_gui_api, _gui_handles, _scene_api, _viser)
+    hooks += [(m, name, ours) for m in modules for name, ours in reports if hasattr(m, name)]
+    for owner, name, ours in hooks:
+        if not hasattr(owner, name):
+            raise ServeError(f"viser {VISER}: {name} is not where it was: install it again")
+        setattr(owner, name, ours)
+    _hush()
+    _installed = True
+
+
+def _hush() -> None:
+    """viser prints its banner and farewell through rich.print, even when not verbose."""
+    import rich
+
+    loud = rich.print
+
+    def quiet(*objects: Any, **options: Any) -> None:
+        if not sys._getframe(1).f_globals.get("__name__", "").startswith("viser"):
+            loud(*objects, **options)
+
+    rich.print = quiet
+
+
+def _serve(handler: Callable[[Any], Awaitable[None]], host: str, port: int, **options: Any) -> Any:
+    """websockets' serve, on the socket of the server that is being started."""
+    door = _opening
+    if door is None:
+        return _real_serve(handler, host, port, **options)
+
+    async def ours(connection: Any) -> None:
+        DOOR.set(door)
+        try:
+            await handler(connection)
+        except Exception as error:  # noqa: BLE001 - a session ends, the page goes on
+            door.failed(None, error)
+
+    return _real_serve(
+        ours,
+        sock=door.listener,
+        process_request=lambda _, request: answer(door, request),
+        process_response=lambda _, request, response: dress(door, request, response),
+        select_subprotocol=_subprotocol,
+        max_size=MAX_MESSAGE,
+        max_queue=4,
+        write_limit=64 * 1024,
+        compression=None,  # slower than what it saves; and no bombs
+        open_timeout=5,
+        ping_interval=15,
+        ping_timeout=15,
+        close_timeout=3,
+        server_header=None,
+        logger=QUIET,
+    )
+
+
+def _subprotocol(_connection: Any, offered: Sequence[Any]) -> Any:
+    return next((p for p in offered if re.fullmatch(r"viser-v[0-9a-z.+-]{1,24}", p)), None)
+
+
+class _NoTunnel:
+    """viser's public tunnel: any browser could ask for it."""
+
+    def __init__(self, *_args: Any, **_options: Any) -> None:
+        raise ServeError("the page is not published: there is no tunnel")
+
+
+def _callback_failed(error: BaseException) -> None:
+    door = DOOR.get()
+    if door is None:
+        log_line(f"{type(error).__name__}: {error}")
+    else:
+        door.failed(None, error)
+
+
+def _future_failed(future: Any) -> None:
+    if not future.cancelled() and future.exception() is not None:
+        _callback_failed(future.exception())
+
+
+def _name_failures(server: viser.ViserServer, door: Door) -> None:
+    """In viser's threads no connection is running: the client is found in what a callback is given."""
+    submit = server._thread_executor.submit
+
+    def named(call: Callable[..., Any], /, *args: Any, **options: Any) -> Any:
+        def run() -> None:
+            try:
+                call(*args, **options)
+            except Exception as error:  # noqa: BLE001 - the page's handler
+                client_id = next(
+                    (i for a in args if isinstance(i := getattr(a, "client_id", None), int)), None
+                )
+                door.failed(client_id, error)
+
+        with contextlib.suppress(RuntimeError):  # a browser leaves while the server stops
+            return submit(run)
+        return _Nothing()
+
+    server._thread_executor.submit = named
+
+
+class _Nothing:
+    """A future that never comes."""
+
+    def add_done_callback(self, _callback: Any) -> None:
+        """Nothing happens, so nothing follows."""
