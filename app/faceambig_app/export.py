@@ -25,8 +25,8 @@ from faceambig.io.pictures import DIAGONAL_35MM
 from faceambig.scene import Curves, Scene
 
 from . import pipeline
-from .provenance import file_name, notes, provenance, shown, who
-from .state import Fitting, Target, ViewState, changed
+from .provenance import file_name, notes, provenance, shown
+from .state import DEFAULT, Fitting, Target, ViewState, changed
 
 SCALES = (1, 2, 4)  # of a picture
 FACES = ("fit", "true")  # of a mesh
@@ -162,7 +162,7 @@ def measured(state: ViewState) -> dict[str, Any]:
 
 def _alpha(state: ViewState, face: Face) -> np.ndarray:
     """(S,) coefficients of the face shown, its bend included."""
-    if state.bend == type(state.bend)(0.0):
+    if state.bend == DEFAULT.bend:
         return face.fit.alpha
     modes = pipeline.bending(state.target, state.fitting)
     return face.fit.alpha + state.flex * modes.directions[0]
@@ -208,7 +208,7 @@ def swept(target: Target, fitting: Fitting) -> tuple[fa.Sweep, Curves]:
     sweep = fa.sweep_distance(
         taken.subject.model,
         taken.observation,
-        modes=None if fitting.modes == ViewState().modes else fitting.modes,
+        modes=None if fitting.modes == DEFAULT.modes else fitting.modes,
         box=fitting.box,
         noise_percent=fitting.prior,
         tolerance=1e-6,

@@ -37,7 +37,7 @@ from . import pipeline, trackplots
 from .packing import TOLERANCE_MM, directions, packed, rounded, step_of
 from .provenance import file_name, provenance, shown, who
 from .state import ViewState, changed
-from .text import NARROW, centimetres, distance_text, percent_number, say
+from .text import centimetres, distance_text, percent_number, say
 from .tracks import (
     FARTHEST,
     LETTERS,
@@ -47,12 +47,21 @@ from .tracks import (
     Track,
     distance_track,
     distances,
+    label,
     mode_track,
+    place_text,
 )
 
 WHATS = ("distance", "mode")  # what a page can move through
 STOPS, SWING_STOPS = 49, 21  # of the way along the distance, and along a mode
-MARKS = (0.2, 0.3, 0.6, 1.2, 2.4, 3.0)  # metres: stops in any case; those that stand still at reduced motion
+MARKS = (
+    0.2,
+    0.3,
+    0.6,
+    1.2,
+    2.4,
+    3.0,
+)  # metres: stops in any case; those that stand still at reduced motion
 OCTAVE_SECONDS, SWING_SECONDS = 2.0, 4.0
 HALF_WIDTH = 0.125  # metres to either side of a head, as far as the page shows
 PHOTO_WIDTH, QUALITY = 560, 88
@@ -172,22 +181,13 @@ def described_track(state: ViewState, track: Track, weights: Array) -> dict[str,
         "along": _short(along, 6),
         "cursor": [_short(values, 2) for values in (x, y_l, y_s)],
         "weights": [_short(row, 7) for row in weights],
-        "stops": [
-            stop_words(track, place, face)
-            for place, face in zip(track.places.tolist(), track.faces, strict=True)
-        ],
+        "stops": [stop_words(track, stop) for stop in range(len(track.places))],
     }
 
 
-def label(track: Track) -> str:
-    """What the slider moves."""
-    if not track.mode:
-        return say("player.distance")
-    return say("player.mode_label", letter=LETTERS[track.mode - 1], words=track.words)
-
-
-def stop_words(track: Track, place: float, face: Face) -> dict[str, Any]:
+def stop_words(track: Track, stop: int) -> dict[str, Any]:
     """What is shown and said at a stop: the same numbers, written the same way, as on the page."""
+    face, text = track.faces[stop], place_text(track, stop)
     d_l, d_s = percent_number(face.d_l_percent), f"{face.d_s_mm:.1f}"
     warning = ""
     if not face.fit.converged:
@@ -195,15 +195,12 @@ def stop_words(track: Track, place: float, face: Face) -> dict[str, Any]:
     elif not face.plausible:
         warning = say("number.implausible")
     if track.mode:
-        there = f"{place:+g}".replace("-", "−") if place else "0"
-        text = f"{there}{NARROW}mm"
-        spoken = say(
-            "player.mode_spoken", place=text, letter=LETTERS[track.mode - 1], d_l=d_l, d_s=d_s
-        )
-        under = f"{say('player.mode', letter=LETTERS[track.mode - 1])}: {text}"
+        letter = LETTERS[track.mode - 1]
+        spoken = say("player.mode_spoken", place=text, letter=letter, d_l=d_l, d_s=d_s)
+        under = f"{say('player.mode', letter=letter)}: {text}"
     else:
-        text = centimetres(place)
-        spoken = say("number.spoken", distance=distance_text(place), d_l=d_l, d_s=d_s)
+        metres = float(track.places[stop])
+        spoken = say("number.spoken", distance=distance_text(metres), d_l=d_l, d_s=d_s)
         under = say("head.assumed", distance=text)
     return {
         "place": text,
@@ -308,9 +305,7 @@ def _words(state: ViewState) -> dict[str, str]:
 
 def policy(script: str, style: str) -> str:
     """The content security policy: this script, this style, pictures inside the file; no connection of any kind."""
-    s, c = (
-        base64.b64encode(sha256(text.encode()).digest()).decode() for text in (script, style)
-    )
+    s, c = (base64.b64encode(sha256(text.encode()).digest()).decode() for text in (script, style))
     return (
         f"default-src 'none'; script-src 'sha256-{s}'; style-src 'sha256-{c}'; img-src data:; base-uri 'none'; "
         "form-action 'none'; require-trusted-types-for 'script'; trusted-types 'none'"
@@ -377,9 +372,11 @@ def table(track: Track) -> str:
     """Every stop in numbers."""
     place = say("plot.axis") if not track.mode else say("player.axis_mode")
     rows = []
-    for metres, face in zip(track.places.tolist(), track.faces, strict=True):
-        words = stop_words(track, metres, face)
-        rows.append(f"<tr><td>{words['place']}</td><td>{words['d_l']}</td><td>{words['d_s']}</td></tr>")
+    for stop in range(len(track.places)):
+        words = stop_words(track, stop)
+        rows.append(
+            f"<tr><td>{words['place']}</td><td>{words['d_l']}</td><td>{words['d_s']}</td></tr>"
+        )
     heads = "".join(
         f'<th scope="col">{escape(name)}</th>' for name in (place, say("plot.d_l"), say("plot.d_s"))
     )
@@ -387,7 +384,11 @@ def table(track: Track) -> str:
 
 
 def _button(track: Track) -> str:
-    return say("player.distance") if not track.mode else say("player.mode", letter=LETTERS[track.mode - 1])
+    return (
+        say("player.distance")
+        if not track.mode
+        else say("player.mode", letter=LETTERS[track.mode - 1])
+    )
 
 
 def _buttons(kind: str, names: Mapping[str, str], pressed: str) -> str:

@@ -19,7 +19,7 @@ WIDTH, HEIGHT, LEFT, RIGHT = 340, 262, 34, 330
 D_L_TOP, D_L_BOTTOM, D_S_TOP, D_S_BOTTOM = 24, 94, 128, 222
 D_L_MAX = 6.0  # percent
 TICKS_CM = (20, 30, 60, 120, 240)
-TICKS_MM = (-10, -5, 0, 5, 10)
+TICKS_MM = (-5, -2.5, 0, 2.5, 5)
 
 
 def along(track: Track) -> Array:
@@ -99,7 +99,7 @@ def _ticks(track: Track) -> list[str]:
     within = (places >= track.places[0] - 1e-9) & (places <= track.places[-1] + 1e-9)
     return [
         f'<path class="tick" d="M{x:.1f} {D_S_BOTTOM}v4"/>'
-        f'<text x="{x:.1f}" y="{D_S_BOTTOM + 17}" text-anchor="middle">{str(tick).replace("-", "−")}</text>'
+        f'<text x="{x:.1f}" y="{D_S_BOTTOM + 17}" text-anchor="middle">{f"{tick:g}".replace("-", "−")}</text>'
         for tick, x, inside in zip(
             ticks, LEFT + _share(track, places) * (RIGHT - LEFT), within, strict=True
         )

@@ -19,11 +19,14 @@ from faceambig.flex import FlexibilityModes, plausible_limit
 from faceambig.scene import Scene
 
 from . import pipeline
-from .state import FIELDS, Bend, Fitting, Target, ViewState, changed
-from .text import say
+from .state import DEFAULT, FIELDS, Fitting, Target, ViewState, changed
+from .text import NARROW, centimetres, say
 
 MODES = 3  # flexibility modes on offer: A, B, C
-SWING_MM = 10.0  # of mean surface change to either side: the paper's figures of modes
+SWING_MM, MOST_MM = (
+    5.0,
+    10.0,
+)  # of mean surface change to either side, if nothing is asked, and the most
 LETTERS = "ABC"
 NEAREST, FARTHEST = FIELDS["distance"].low, FIELDS["distance"].high  # metres
 
@@ -56,9 +59,7 @@ def distances(low: float, high: float, count: int, through: Sequence[float] = ()
 def distance_track(state: ViewState, metres: Array) -> Track:
     """The fits that assume `metres` (F,), ascending; of the far-away camera's state too."""
     target, fitting = state.target, state.fitting
-    faces = [
-        pipeline.face(target, fitting._replace(distance=float(d)), state.bend) for d in metres
-    ]
+    faces = [pipeline.face(target, fitting._replace(distance=float(d)), state.bend) for d in metres]
     return Track(0, metres, tuple(faces))
 
 
@@ -81,7 +82,7 @@ def bending(target: Target, fitting: Fitting) -> FlexibilityModes:
 def bent(target: Target, fitting: Fitting, mode: int, mm: float) -> Face:
     """The fit of a target bent by `mm` along mode `mode`, from 1, measured; 0 mm: the fit itself."""
     if mm == 0:
-        return pipeline.face(target, fitting, Bend(0.0))
+        return pipeline.face(target, fitting, DEFAULT.bend)
     fit, modes = pipeline.fitted(target, fitting), bending(target, fitting)
     return measure(
         pipeline.photograph(target).subject,
@@ -113,4 +114,20 @@ def scene_of(state: ViewState, track: Track, stop: int) -> Scene:
         legend_words=(say("legend.difference"), say("legend.unmeasured")),
         note=base.note,
     )
-    return replace(base, heads=scene.heads, photo=scene.photo, numbers=scene.numbers)
+    note = f"{label(track)}: {place_text(track, stop)}; {base.note}"
+    return replace(base, heads=scene.heads, photo=scene.photo, numbers=scene.numbers, note=note)
+
+
+def label(track: Track) -> str:
+    """What moves, in words."""
+    if not track.mode:
+        return say("player.distance")
+    return say("player.mode_label", letter=LETTERS[track.mode - 1], words=track.words)
+
+
+def place_text(track: Track, stop: int) -> str:
+    """Where a stop lies: 120 cm; −3 mm."""
+    place = float(track.places[stop])
+    if not track.mode:
+        return centimetres(place)
+    return f"{float(f'{place:.2f}'):+g}{NARROW}mm".replace("-", "−").replace("+0", "0")

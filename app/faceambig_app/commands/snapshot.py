@@ -35,6 +35,11 @@ def add(command: argparse.ArgumentParser) -> None:
     )
     command.add_argument("--width", type=int, metavar="PX", help="width of the picture")
     command.add_argument("--height", type=int, metavar="PX", help="height of the picture")
+    add_state(command)
+
+
+def add_state(command: argparse.ArgumentParser) -> None:
+    """The flags of a state: the model, and the rows of the field table."""
     command.add_argument(
         "--model", default=DEFAULT.model, help="model name or path (default embedded)"
     )
