@@ -275,7 +275,7 @@
       v_measured = measured;
       gl_Position = vec4(seen.xy / half_size, -seen.z / 0.4, 1.0); // parallel rays: perspective is the photo's alone
     }`;
-  const fragment = (n) => `
+  const fragment = (n, colours) => `
     precision highp float;
     uniform vec3 towards[${n}], light[${n}], rest;
     uniform float ambient, occlusion, largest, grey;
@@ -292,7 +292,7 @@
       if (!gl_FrontFacing) {
         colour = vec3(0.42); // a cut surface, never a look into the empty head
       } else if (values) {
-        vec3 value = texture2D(legend, vec2(clamp(v_gap / largest, 0.0, 1.0) * 63.0 / 64.0 + 0.5 / 64.0, 0.5)).rgb;
+        vec3 value = texture2D(legend, vec2(clamp(v_gap / largest, 0.0, 1.0) * ${colours - 1}.0 / ${colours}.0 + 0.5 / ${colours}.0, 0.5)).rgb;
         float turned = 1.0 - clamp(n.z, 0.0, 1.0);
         colour = mix(rest, value, v_measured) * (1.0 - 0.42 * pow(turned, 1.6));
       } else {
@@ -306,7 +306,7 @@
 
   function program(gl) {
     const made = gl.createProgram();
-    for (const [kind, source] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, fragment(data.lights.length)]]) {
+    for (const [kind, source] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, fragment(data.lights.length, data.legend.colours.length)]]) {
       const shader = gl.createShader(kind);
       gl.shaderSource(shader, source);
       gl.compileShader(shader);

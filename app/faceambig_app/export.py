@@ -25,6 +25,7 @@ from faceambig.io.pictures import DIAGONAL_35MM
 from faceambig.scene import Curves, Scene
 
 from . import pipeline
+from .forms import to_json
 from .provenance import file_name, notes, provenance, shown
 from .state import DEFAULT, Fitting, Target, ViewState, changed
 
@@ -100,7 +101,9 @@ def mesh(state: ViewState, kind: str, *, face: str = "fit") -> tuple[str, bytes]
         raise ValueError(f"face: {face!r} is not one of {', '.join(FACES)}")
     state = changed(state, show="both")
     scene = pipeline.frame(state, with_curves=False).scene
-    head = next(head for head in scene.heads if head.name == face)
+    head = next((head for head in scene.heads if head.name == face), None)
+    if head is None:
+        raise ValueError(f"face: {face!r} is hidden in this state")
     about = (head.title, *notes(state))
     written = Mesh(
         head.vertices, head.faces, head.colours, vertex_normals(head.vertices, head.faces), about
@@ -109,8 +112,8 @@ def mesh(state: ViewState, kind: str, *, face: str = "fit") -> tuple[str, bytes]
 
 
 def state_file(state: ViewState) -> tuple[str, bytes]:
-    """The state as JSON, defaults left out: what `msgspec.json.decode(..., type=ViewState)` reads."""
-    return file_name(shown(state), "state.json"), (pipeline.state_json(state) + "\n").encode()
+    """The state as JSON, defaults left out: what `forms.from_json` and `--state` read."""
+    return file_name(shown(state), "state.json"), (to_json(state) + "\n").encode()
 
 
 def numbers(state: ViewState, kind: str) -> tuple[str, bytes]:
@@ -139,7 +142,7 @@ def measured(state: ViewState) -> dict[str, Any]:
         "format": "faceambig-numbers",
         "version": FORMAT_VERSION,
         **{name.lower(): value for name, value in provenance(state).items() if name != "ViewState"},
-        "state": json.loads(pipeline.state_json(state)),
+        "state": json.loads(to_json(state)),
         "subject": pipeline.photograph(state.target).subject.name,
         "actual_m": state.actual,
         "camera": state.camera,
@@ -162,10 +165,11 @@ def measured(state: ViewState) -> dict[str, Any]:
 
 def _alpha(state: ViewState, face: Face) -> np.ndarray:
     """(S,) coefficients of the face shown, its bend included."""
-    if state.bend == DEFAULT.bend:
+    if not state.flex:
         return face.fit.alpha
-    modes = pipeline.bending(state.target, state.fitting)
-    return face.fit.alpha + state.flex * modes.directions[0]
+    last = max(mode for mode, _ in state.flex)
+    modes = pipeline.bending(state.target, state.fitting, state.flex_at, last)
+    return face.fit.alpha + sum(mm * modes.directions[mode - 1] for mode, mm in state.flex)
 
 
 def _focal_35mm(fit: fa.Fit) -> float | None:

@@ -20,8 +20,9 @@ Say = Callable[[dict[str, Any]], None]
 Listener = Callable[[viser.GuiEvent[Any]], Coroutine[Any, Any, None]]
 
 STEPS_PER_OCTAVE = 24.0  # of a distance slider: 2.9 % a step
+MODE_A = 1  # the most flexible
 MARKS_CM = (20, 30, 60, 120, 240)
-VIEWS = FIELDS["view"].choices
+VIEWS = ("front", "three_quarter", "side", "top", "camera")  # each a button
 
 
 class Panel:
@@ -32,6 +33,7 @@ class Panel:
     ) -> None:
         self._gui, self._say = gui, say_change
         self._people = people
+        self._bends = state.flex  # of all modes; the slider moves the first
         self._build_distance(state)
 
     def _build_distance(self, state: ViewState) -> None:
@@ -47,7 +49,7 @@ class Panel:
         self._subject = self._gui.add_dropdown(
             say("field.subject"),
             self._people,
-            initial_value=self._people[state.subject - 1],
+            initial_value=self._person(state),
             hint=say("field.subject_hint"),
         )
         self._subject.on_update(self._heard("subject", lambda name: self._people.index(name) + 1))
@@ -65,9 +67,9 @@ class Panel:
                 for name in ("yaw", "pitch", "roll")
             }
         with self._gui.add_folder(say("folder.flex"), expand_by_default=False):
-            self._flex = self._linear_slider("flex", state.flex)
+            self._flex = self._linear_slider("flex", bent(state.flex), self._bend)
             zero = self._gui.add_button(say("flex.zero"))
-            zero.on_click(self._heard("flex", lambda _: 0.0))
+            zero.on_click(self._heard("flex", lambda _: ()))
             self.flex_words = self._gui.add_html("")
 
     @property
@@ -80,10 +82,11 @@ class Panel:
         self._distance.value = to_step(FIELDS["distance"], state.distance)
         self._distance_cm.value = centimetres(state.distance)
         self._actual.value = to_step(FIELDS["actual"], state.actual)
-        self._subject.value = self._people[state.subject - 1]
+        self._subject.value = self._person(state)
         for name, handle in self._pose.items():
             handle.value = getattr(state, name)
-        self._flex.value = state.flex
+        self._bends = state.flex
+        self._flex.value = bent(state.flex)
 
     @property
     def controls(self) -> tuple[viser.GuiInputHandle[Any], ...]:
@@ -107,6 +110,10 @@ class Panel:
             "valuetext", texts
         )
 
+    def _person(self, state: ViewState) -> str:
+        # Of a photograph nobody's name is in this list: the first stands there
+        return self._people[state.subject - 1 if isinstance(state.subject, int) else 0]
+
     def _distance_slider(self, name: str, value: float) -> viser.GuiSliderHandle[int]:
         field = FIELDS[name]
         marks = [cm for cm in (*MARKS_CM, 500) if field.low <= cm / 100 <= field.high]
@@ -117,7 +124,13 @@ class Panel:
         handle.on_update(self._heard(name, lambda step: from_step(field, step)))
         return handle
 
-    def _linear_slider(self, name: str, value: float) -> viser.GuiSliderHandle[float]:
+    def _bend(self, mm: float) -> tuple[tuple[int, float], ...]:
+        others = (pair for pair in self._bends if pair[0] != MODE_A)
+        return (MODE_A, float(mm)), *others
+
+    def _linear_slider(
+        self, name: str, value: float, read: Callable[[Any], Any] = float
+    ) -> viser.GuiSliderHandle[float]:
         field = FIELDS[name]
         handle = self._gui.add_slider(
             say(f"field.{name}"),
@@ -127,7 +140,7 @@ class Panel:
             float(value),
             hint=say(f"field.{name}_hint"),
         )
-        handle.on_update(self._heard(name, float))
+        handle.on_update(self._heard(name, read))
         return handle
 
     def _heard(self, name: str, read: Callable[[Any], Any]) -> Listener:
@@ -136,6 +149,11 @@ class Panel:
                 self._say({name: read(event.target.value)})
 
         return heard
+
+
+def bent(flex: tuple[tuple[int, float], ...]) -> float:
+    """Millimetres along mode A."""
+    return dict(flex).get(MODE_A, 0.0)
 
 
 def centimetres(metres: float) -> float:

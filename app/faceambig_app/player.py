@@ -1,19 +1,14 @@
 """The standalone page: a track or several in one HTML file that plays from disk, with no network and no Python.
 
 The script (assets/player.js) draws what lies in the file and computes nothing of the face: at a stop it shows the
-words of the pipeline for it, while it plays it moves between stops. The policy in its head allows that script and its
-style by their hashes and nothing else: no request, no eval, no style attribute.
+words of the pipeline for it, while it plays it moves between stops. This module says what lies in the file, and
+standalone.py how it is written.
 """
 
 from __future__ import annotations
 
-import base64
-import json
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from hashlib import sha256
-from html import escape
 from typing import Any
 
 import numpy as np
@@ -21,7 +16,6 @@ from numpy.typing import NDArray
 
 from faceambig.arrays import Array
 from faceambig.compose import (
-    DIFFERENCE_MM,
     HALF_HEIGHT,
     UNMEASURED,
     VIEWS,
@@ -30,14 +24,14 @@ from faceambig.compose import (
     pivot,
     skin,
 )
-from faceambig.io.files import asset_path
-from faceambig.scene import Photo, Scene
+from faceambig.scene import Scene
 
 from . import pipeline, trackplots
-from .packing import TOLERANCE_MM, directions, packed, rounded, step_of
-from .provenance import file_name, provenance, shown, who
+from .packing import directions, packed, rounded, step_of
+from .provenance import file_name, shown, who
+from .standalone import CIRCLE, html
 from .state import ViewState, changed
-from .text import centimetres, distance_text, percent_number, say
+from .text import distance_text, percent_number, say
 from .tracks import (
     FARTHEST,
     LETTERS,
@@ -54,17 +48,10 @@ from .tracks import (
 
 WHATS = ("distance", "mode")  # what a page can move through
 STOPS, SWING_STOPS = 49, 21  # of the way along the distance, and along a mode
-MARKS = (
-    0.2,
-    0.3,
-    0.6,
-    1.2,
-    2.4,
-    3.0,
-)  # metres: stops in any case; those that stand still at reduced motion
+# Metres: stops in any case, and what is shown, one picture at a time, where motion is to be reduced
+MARKS = (0.2, 0.3, 0.6, 1.2, 2.4, 3.0)
 OCTAVE_SECONDS, SWING_SECONDS = 2.0, 4.0
 HALF_WIDTH = 0.125  # metres to either side of a head, as far as the page shows
-PHOTO_WIDTH, QUALITY = 560, 88
 LANDMARK_SHARE = 30_000  # a landmark is rounded to this part of the picture's longer side
 LIGHTS = (  # as on the page: direction towards the light (right, up, back), colour of 255, intensity
     ((-0.5, 0.7, 1.2), (255, 244, 232), 2.8),
@@ -72,7 +59,6 @@ LIGHTS = (  # as on the page: direction towards the light (right, up, back), col
     ((0.0, 0.6, -1.0), (255, 250, 245), 0.9),
 )
 AMBIENT, OCCLUSION_POWER = 0.75, 1.3
-CROSS, CIRCLE = 3.6, 4.6  # half sizes, pixels of a picture of 500
 
 
 def page(
@@ -91,10 +77,9 @@ def page(
     photo = scene.photo if own_photo or not own else replace(scene.photo, pixels=None)
     data, geometry = contents(state, scene, tracks)
     words = "_".join((shown(state) if "mode" in whats else who(state), *whats))
-    html = filled(
-        state, tracks, photo, data, geometry, said=say("player.left_out") if own and not own_photo else ""
-    )  # fmt: skip
-    return file_name(words, "html"), html.encode()
+    said = say("player.left_out") if own and not own_photo else ""
+    text = html(state, tracks, photo, data, geometry, said=said)
+    return file_name(words, "html"), text.encode()
 
 
 def tracks_of(state: ViewState, whats: Sequence[str]) -> list[Track]:
@@ -152,9 +137,9 @@ def contents(state: ViewState, scene: Scene, tracks: Sequence[Track]) -> tuple[d
         "pivot": pivot(face_model),
         "half": [HALF_WIDTH, HALF_HEIGHT],
         "views": VIEWS,
-        "view": scene.views[0].name if scene.views[0].name in VIEWS else "three_quarter",
+        "view": state.view if state.view in VIEWS else "three_quarter",
         "difference": state.surface == "difference",
-        "legend": {"colours": legend.colours.tolist(), "mm": DIFFERENCE_MM, "rest": UNMEASURED},
+        "legend": {"colours": legend.colours.tolist(), "mm": legend.high, "rest": UNMEASURED},
         "lights": LIGHTS,
         "ambient": AMBIENT,
         "occlusion": OCCLUSION_POWER,
@@ -220,190 +205,3 @@ def _landmarks(faces: Sequence[Face], unit: float) -> NDArray[np.int32]:
 
 def _short(values: Array, digits: int) -> list[float]:
     return [float(f"{value:.{digits}g}") if value else 0.0 for value in values.tolist()]
-
-
-# ---- the file ----
-
-
-def filled(
-    state: ViewState, tracks: Sequence[Track], photo: Photo, data: Mapping[str, Any], geometry: str, *, said: str = ""
-) -> str:  # fmt: skip
-    """The HTML of assets/player.html with its places filled in. `said`: one more line of the footer."""
-    style, script = (_asset(f"player.{ending}") for ending in ("css", "js"))
-    origin = provenance(state)
-    points = len(photo.observed)
-    lead = (
-        say("player.lead", actual=distance_text(state.actual), points=points)
-        if not tracks[0].mode
-        else say(
-            "player.lead_modes",
-            actual=distance_text(state.actual),
-            assumed=distance_text(tracks[0].faces[0].fit.distance),
-            points=points,
-        )
-    )
-    return _substituted(
-        _asset("player.html"),
-        {
-            "policy": policy(script, style),
-            "style": style,
-            "script": script,
-            "data": json.dumps(data, separators=(",", ":"), ensure_ascii=False).replace("<", r"\u003c"),
-            "geometry": geometry,
-            "metas": "\n".join(
-                f'<meta name="faceambig:{name.lower()}" content="{escape(value)}">'
-                for name, value in origin.items()
-            ),
-            "photo": photo_html(photo),
-            "plots": "".join(
-                f'<div data-track="{track.name}"{" hidden" if i else ""}>{trackplots.plots(track, state.actual)}</div>'
-                for i, track in enumerate(tracks)
-            ),
-            "tables": "".join(table(track) for track in tracks),
-            "tracks": _buttons("track", {t.name: _button(t) for t in tracks}, tracks[0].name)
-            if len(tracks) > 1
-            else "",
-            "views": _buttons("view", {v: say(f"view.{v}") for v in VIEWS}, str(data["view"])),
-            "origin": "".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in origin.items()),
-            "said": f"<p>{escape(said)}</p>" if said else "",
-            "true_note": escape(say("head.taken", distance=centimetres(state.actual))),
-            "lead": escape(lead),
-            "label": escape(label(tracks[0])),
-            "last": str(len(tracks[0].places) - 1),
-            "start": str(data["tracks"][0]["start"]),
-            "legend": legend_html(),
-            **{name: escape(text) for name, text in _words(state).items()},
-        },
-    )  # fmt: skip
-
-
-def _words(state: ViewState) -> dict[str, str]:
-    origin = provenance(state)
-    return {
-        "heading": say("app.heading"),
-        "true": say("head.true"),
-        "fit": say("head.fit"),
-        "d_l": say("number.d_l"),
-        "d_l_note": say("number.d_l_note"),
-        "d_s": say("number.d_s"),
-        "d_s_note": say("number.d_s_note"),
-        "play": say("player.play"),
-        "difference": say("player.difference"),
-        "heads": say("player.heads"),
-        "keys": say("player.keys"),
-        "table": say("player.table"),
-        "views_name": say("player.views"),
-        "no_script": say("player.no_script"),
-        "no_faces": say("player.no_faces"),
-        "rounded": say("player.rounded", mm=f"{TOLERANCE_MM:g}"),
-        "made": say("player.made"),
-        "software": origin["Software"],
-        "model": origin["Model"].split(":")[0],
-        "licence": origin["Licence"],
-    }
-
-
-def policy(script: str, style: str) -> str:
-    """The content security policy: this script, this style, pictures inside the file; no connection of any kind."""
-    s, c = (base64.b64encode(sha256(text.encode()).digest()).decode() for text in (script, style))
-    return (
-        f"default-src 'none'; script-src 'sha256-{s}'; style-src 'sha256-{c}'; img-src data:; base-uri 'none'; "
-        "form-action 'none'; require-trusted-types-for 'script'; trusted-types 'none'"
-    )
-
-
-def photo_html(photo: Photo) -> str:
-    """The photograph with red crosses and, for the script to move, blue circles; a white halo around both."""
-    unit = photo.width / 500
-    size = (PHOTO_WIDTH, max(1, round(photo.height * PHOTO_WIDTH / photo.width)))
-    arm = CROSS * unit
-    crosses = "".join(
-        f"M{x - arm:.1f} {y - arm:.1f}l{2 * arm:.1f} {2 * arm:.1f}m0 {-2 * arm:.1f}l{-2 * arm:.1f} {2 * arm:.1f}"
-        for x, y in photo.observed
-        if np.isfinite(x + y)
-    )
-    alt = escape(say("player.photo", points=len(photo.observed), caption=photo.caption))
-    return (
-        f'<img alt="{alt}" width="{size[0]}" height="{size[1]}" '
-        f'src="data:image/jpeg;base64,{base64.b64encode(_jpeg(photo)).decode()}">'
-        f'<svg viewBox="0 0 {photo.width} {photo.height}" aria-hidden="true" fill="none">'
-        f'<g stroke="#FFF" stroke-width="{3.4 * unit:.1f}"><path d="{crosses}"/><path data-circles/></g>'
-        f'<g stroke-width="{1.7 * unit:.1f}"><path class="seen" d="{crosses}"/><path class="fitted" data-circles/></g>'
-        f"</svg><figcaption><span>{escape(photo.caption)}</span>"
-        f"<span>{_key('seen', 'M2 2l8 8m0 -8l-8 8')}{escape(say('app.cross'))}</span>"
-        f"<span>{_key('fitted', 'M1.5 6a4.5 4.5 0 1 0 9 0a4.5 4.5 0 1 0 -9 0')}{escape(say('app.circle'))}</span>"
-        "</figcaption>"
-    )
-
-
-def _key(tone: str, path: str) -> str:
-    return f'<svg viewBox="0 0 12 12" aria-hidden="true" fill="none"><path class="{tone}" d="{path}"/></svg>'
-
-
-def _jpeg(photo: Photo) -> bytes:
-    import cv2
-
-    from faceambig.render.painter import paint_photo
-
-    rgb = paint_photo(photo, PHOTO_WIDTH) if photo.pixels is None else photo.pixels
-    return cv2.imencode(".jpg", rgb[:, :, ::-1], (cv2.IMWRITE_JPEG_QUALITY, QUALITY))[1].tobytes()
-
-
-def legend_html() -> str:
-    """The scale of the difference as an SVG, its ticks below."""
-    legend = difference_legend("", "")
-    width = 200 / len(legend.colours)
-    bars = "".join(
-        f'<rect x="{10 + i * width:.2f}" y="2" width="{width + 0.3:.2f}" height="10" shape-rendering="crispEdges" fill="#{r:02x}{g:02x}{b:02x}"/>'
-        for i, (r, g, b) in enumerate(legend.colours.tolist())
-    )
-    ticks = "".join(
-        f'<text x="{10 + 200 * tick / legend.high:.1f}" y="26" text-anchor="middle">{tick:g}</text>'
-        for tick in legend.ticks
-    )
-    words = f"{say('legend.difference')}; {say('legend.unmeasured')}"
-    return (
-        f'<svg viewBox="0 0 220 30" width="220" height="30" aria-hidden="true">{bars}{ticks}</svg>'
-        f"<span>{escape(words)}</span>"
-    )
-
-
-def table(track: Track) -> str:
-    """Every stop in numbers."""
-    place = say("plot.axis") if not track.mode else say("player.axis_mode")
-    rows = []
-    for stop in range(len(track.places)):
-        words = stop_words(track, stop)
-        rows.append(
-            f"<tr><td>{words['place']}</td><td>{words['d_l']}</td><td>{words['d_s']}</td></tr>"
-        )
-    heads = "".join(
-        f'<th scope="col">{escape(name)}</th>' for name in (place, say("plot.d_l"), say("plot.d_s"))
-    )
-    return f"<table><caption>{escape(label(track))}</caption><thead><tr>{heads}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
-
-
-def _button(track: Track) -> str:
-    return (
-        say("player.distance")
-        if not track.mode
-        else say("player.mode", letter=LETTERS[track.mode - 1])
-    )
-
-
-def _buttons(kind: str, names: Mapping[str, str], pressed: str) -> str:
-    name = say("player.tracks") if kind == "track" else say("player.views")
-    buttons = "".join(
-        f'<button type="button" data-{kind}-button="{key}" aria-pressed="{str(key == pressed).lower()}">{escape(text)}</button>'
-        for key, text in names.items()
-    )
-    return f'<div class="group" role="group" aria-label="{escape(name)}">{buttons}</div>'
-
-
-def _asset(name: str) -> str:
-    return asset_path(name).read_text(encoding="utf-8")
-
-
-def _substituted(template: str, values: Mapping[str, str]) -> str:
-    """{{name}} replaced; in one pass, so what was filled in is not read."""
-    return re.sub(r"\{\{(\w+)\}\}", lambda place: values[place.group(1)], template)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from importlib.metadata import version
 
-from .pipeline import model, state_json
+from .forms import to_json
+from .pipeline import model
 from .state import ViewState
 
 
@@ -13,7 +14,7 @@ def provenance(state: ViewState) -> dict[str, str]:
     face = model(state.model)
     return {
         "Software": f"faceambig {version('faceambig')}",
-        "ViewState": state_json(state),
+        "ViewState": to_json(state),
         "Model": f"{face.name}: {face.source}",
         "Licence": face.licence,
     }
@@ -25,7 +26,9 @@ def notes(state: ViewState) -> tuple[str, ...]:
 
 
 def who(state: ViewState) -> str:
-    """subject3_30cm: who was photographed, and from where."""
+    """subject3_30cm: who was photographed, and from where; of a photograph of one's own nothing is known."""
+    if isinstance(state.subject, str):
+        return state.subject
     return f"subject{state.subject}_{centimetres(state.actual)}"
 
 

@@ -8,18 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 
-import faceambig as fa
 from faceambig.arrays import Array
-from faceambig.compose import Face, compose, measure
-from faceambig.flex import FlexibilityModes, plausible_limit
+from faceambig.compose import Face
 from faceambig.scene import Scene
 
 from . import pipeline
-from .state import DEFAULT, FIELDS, Fitting, Target, ViewState, changed
+from .state import FIELDS, ViewState, changed
 from .text import NARROW, centimetres, say
 
 MODES = 3  # flexibility modes on offer: A, B, C
@@ -67,55 +64,31 @@ def mode_track(state: ViewState, mode: int, millimetres: Array) -> Track:
     """The state's fit bent by `millimetres` (F,), ascending, along flexibility mode `mode`, from 1."""
     if not 1 <= mode <= MODES:
         raise ValueError(f"mode: {mode} is not within 1 to {MODES}")
-    modes = bending(state.target, state.fitting)
-    faces = [bent(state.target, state.fitting, mode, float(mm)) for mm in millimetres]
+    states = [bent(state, mode, float(mm)) for mm in millimetres]
+    faces = [pipeline.face(one.target, one.fitting, one.bend) for one in states]
+    modes = pipeline.bending(state.target, state.fitting, state.flex_at, MODES)
     return Track(mode, millimetres, tuple(faces), modes.words[mode - 1])
 
 
-@lru_cache(maxsize=16)
-def bending(target: Target, fitting: Fitting) -> FlexibilityModes:
-    """The MODES most flexible modes of a fit."""
-    fit = pipeline.fitted(target, fitting)
-    return fa.flexibility_modes(fit.model, fit, count=MODES)
+def bent(state: ViewState, mode: int, mm: float) -> ViewState:
+    """The state with its fit bent by `mm` along mode `mode`, from 1; what other modes bend stays."""
+    return changed(state, flex=tuple((dict(state.flex) | {mode: mm}).items()))
 
 
-def bent(target: Target, fitting: Fitting, mode: int, mm: float) -> Face:
-    """The fit of a target bent by `mm` along mode `mode`, from 1, measured; 0 mm: the fit itself."""
-    if mm == 0:
-        return pipeline.face(target, fitting, DEFAULT.bend)
-    fit, modes = pipeline.fitted(target, fitting), bending(target, fitting)
-    return measure(
-        pipeline.photograph(target).subject,
-        fit,
-        mm * modes.directions[mode - 1],
-        # As on the page: a fit that is beyond the limit by itself is not blamed on the bend
-        limit=max(plausible_limit(len(fit.alpha)), float(np.linalg.norm(fit.alpha))),
-        flex_words=modes.words[mode - 1],
-        flex_mm=mm,
-    )
+def state_at(state: ViewState, track: Track, stop: int) -> ViewState:
+    """The state of the page that shows a stop."""
+    place = float(track.places[stop])
+    if track.mode:
+        return bent(state, track.mode, place)
+    return changed(state, camera="perspective", distance=place)
 
 
 def scene_of(state: ViewState, track: Track, stop: int) -> Scene:
-    """The page's picture of a stop."""
-    state = changed(state, show="both")
+    """The page's picture of a stop; of a mode, its words and millimetres go before the note."""
+    scene = pipeline.frame(state_at(state, track, stop)).scene
     if not track.mode:
-        return pipeline.frame(
-            changed(state, camera="perspective", distance=float(track.places[stop]))
-        ).scene
-    base = pipeline.frame(state).scene
-    scene = compose(
-        pipeline.photograph(state.target).subject,
-        track.faces[stop],
-        pipeline.picture(state.target),
-        titles=(base.heads[0].title, base.heads[1].title),
-        view=state.view,
-        surface=state.surface,
-        curve=base.curves,
-        legend_words=(say("legend.difference"), say("legend.unmeasured")),
-        note=base.note,
-    )
-    note = f"{label(track)}: {place_text(track, stop)}; {base.note}"
-    return replace(base, heads=scene.heads, photo=scene.photo, numbers=scene.numbers, note=note)
+        return scene
+    return replace(scene, note=f"{label(track)}: {place_text(track, stop)}; {scene.note}")
 
 
 def label(track: Track) -> str:

@@ -15,7 +15,7 @@ import pytest
 
 from faceambig.errors import AssetError
 from faceambig_app import panel, text
-from faceambig_app.state import DEFAULT, FIELDS
+from faceambig_app.state import DEFAULT
 from faceambig_app.text import centimetres, distance_text, percent_number, say, words
 
 ROOT = Path(__file__).parents[2]
@@ -75,11 +75,11 @@ def test_every_word_of_the_file_is_asked_for(recorded):
     # keys put together from names are those that a real panel looks up
     shown = panel.Panel(MagicMock(), DEFAULT, ("a", "b", "c"), lambda _: None)
     shown.build_rest(DEFAULT)
-    for name in FIELDS["view"].choices:
+    for name in panel.VIEWS:
         say(f"view.{name}")
     shown.spoken(DEFAULT)
     exact = {ask.replace("\\", "") for _, ask in ASKED if "[" not in ask}
-    views = {f"view.{name}" for name in FIELDS["view"].choices}
+    views = {f"view.{name}" for name in panel.VIEWS}
     assert KEYS - exact - recorded - views == set()
     assert (exact | recorded | views) - KEYS == set()
 
