@@ -1,6 +1,6 @@
 // The standalone page: draws the faces that lie in the file. Nothing of a face is computed here: at a stop the words
 // and places are the program's (player.py wrote them), while it plays the faces move straight from stop to stop.
-// No request, no eval; styles are set through the DOM only, as the policy of the page wants it.
+// It asks for nothing and makes no code of text; styles are set through the DOM only: the policy wants it so.
 (() => {
   "use strict";
   const at = (id) => document.getElementById(id);

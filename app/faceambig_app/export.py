@@ -99,11 +99,11 @@ def mesh(state: ViewState, kind: str, *, face: str = "fit") -> tuple[str, bytes]
     """The fitted face, laid rigidly on the true one, or the true face: metres, in the colours it is shown in."""
     if face not in FACES:
         raise ValueError(f"face: {face!r} is not one of {', '.join(FACES)}")
+    if face == "true" and "truth" in state.hide:
+        raise ValueError("face: 'true' is hidden in this state")
     state = changed(state, show="both")
     scene = pipeline.frame(state, with_curves=False).scene
-    head = next((head for head in scene.heads if head.name == face), None)
-    if head is None:
-        raise ValueError(f"face: {face!r} is hidden in this state")
+    head = next(head for head in scene.heads if head.name == face)
     about = (head.title, *notes(state))
     written = Mesh(
         head.vertices, head.faces, head.colours, vertex_normals(head.vertices, head.faces), about
@@ -195,7 +195,7 @@ def _along_distance(state: ViewState) -> dict[str, Any]:
             "tolerance_percent": interval.tolerance_percent,
         },
         "curves": {
-            "distance_m": [fit.distance for fit in fits],
+            "distance_m": [*sweep.distances.tolist(), None],
             "d_l_percent": [*curve.d_l_percent.tolist(), curve.orthographic[0]],
             "d_s_mm": [*curve.d_s_mm.tolist(), curve.orthographic[1]],
             "focal_px": [fit.focal for fit in fits],
