@@ -74,17 +74,24 @@ def files(state: ViewState, kind: str, **options: Any) -> tuple[str, bytes]:
 
 
 def picture(
-    state: ViewState, *, scale: int = 1, transparent: bool = False, own_photo: bool = False
+    state: ViewState,
+    *,
+    scale: int = 1,
+    transparent: bool = False,
+    overlays: bool = True,
+    own_photo: bool = False,
 ) -> tuple[str, bytes]:
-    """The snapshot as a PNG of `scale` times 1440 x 900, a strip 1600 x 760. transparent: nothing behind the heads."""
+    """The snapshot as a PNG of `scale` times 1440 x 900, a strip 1600 x 760.
+
+    transparent: nothing behind the heads. overlays: False leaves the heads alone, without words, marks and numbers.
+    """
     from faceambig.render.overlay import draw, encode_png
 
     if scale not in SCALES:
         raise ValueError(f"scale: {scale!r} is not one of {', '.join(map(str, SCALES))}")
     scene = pipeline.frame(state).scene
-    rgba = draw(
-        scene if own_photo else without_own_photo(scene), scale=scale, transparent=transparent
-    )
+    scene = scene if own_photo else without_own_photo(scene)
+    rgba = draw(scene, scale=scale, transparent=transparent, overlays=overlays)
     return file_name(shown(state), "png"), encode_png(rgba, provenance(state))
 
 
@@ -137,11 +144,13 @@ def measured(state: ViewState) -> dict[str, Any]:
     """
     state = changed(state, show="both")
     face = pipeline.face(state.target, state.fitting, state.bend)
-    fit = face.fit
+    fit, origin = face.fit, provenance(state)
     return {
         "format": "faceambig-numbers",
         "version": FORMAT_VERSION,
-        **{name.lower(): value for name, value in provenance(state).items() if name != "ViewState"},
+        "software": origin["Software"],
+        "model": origin["Model"],
+        "licence": origin["Licence"],
         "state": json.loads(to_json(state)),
         "subject": pipeline.photograph(state.target).subject.name,
         "actual_m": state.actual,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from string import ascii_uppercase
 
 import numpy as np
 
@@ -24,7 +25,7 @@ SWING_MM, MOST_MM = (
     5.0,
     10.0,
 )  # of mean surface change to either side, if nothing is asked, and the most
-LETTERS = "ABC"
+LETTERS = ascii_uppercase[:MODES]
 NEAREST, FARTHEST = FIELDS["distance"].low, FIELDS["distance"].high  # metres
 
 

@@ -185,10 +185,10 @@ def test_size_ground_and_own_photo_reach_the_renderer(monkeypatch):
     monkeypatch.setattr("faceambig.render.overlay.draw", drawn)
     with_own_photo(monkeypatch)
     export.files(STATE, "png")
-    export.files(STATE, "png", scale=4, transparent=True, own_photo=True)
-    assert [(shown, o["scale"], o["transparent"]) for shown, o in asked] == [
-        (False, 1, False),
-        (True, 4, True),
+    export.files(STATE, "png", scale=4, transparent=True, overlays=False, own_photo=True)
+    assert asked == [
+        (False, {"scale": 1, "transparent": False, "overlays": True}),
+        (True, {"scale": 4, "transparent": True, "overlays": False}),
     ]
 
 
