@@ -199,6 +199,15 @@ class Canvas:
 
         self.ink(colour, points, width * self.unit, strokes)
 
+    def area(self, x: Array, y: Array, colour: Colour) -> None:
+        """What a closed line through points surrounds."""
+        points = np.stack([x, y], axis=1) * self.unit
+
+        def inside(mask: Picture, place: Place) -> None:
+            cv2.fillPoly(mask, [place(points)], 255, shift=4)
+
+        self.ink(colour, points, 0.0, inside)
+
     def circle(
         self, at: tuple[float, float], radius: float, colour: Colour, width: float = 0.0
     ) -> None:
