@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,9 @@ from .tracks import (
     scene_of,
 )
 
+if TYPE_CHECKING:
+    from PIL import Image
+
 Picture = NDArray[np.uint8]  # (H, W, 3) sRGB
 Progress = Callable[[int, int], None]  # frames drawn, of how many
 
@@ -36,7 +40,7 @@ LIMITS = {"seconds": (0.5, 60.0), "fps": (1.0, 30.0), "width": (320, 1920)}
 SHAPE = 0.625  # height over width, as of the snapshot
 MOST_PIXELS = 200_000_000  # of all frames together: 600 MB
 QUALITY, METHOD = 85, 4  # of WebP
-COLOURS = 256  # of GIF
+COLOURS, EXACT = 256, 8  # of GIF
 SOFTWARE, DESCRIPTION = 0x0131, 0x010E  # EXIF
 
 
@@ -159,17 +163,44 @@ def encode_webp(frames: Sequence[Picture], fps: float, state: ViewState) -> byte
 
 def encode_gif(frames: Sequence[Picture], fps: float, state: ViewState) -> bytes:
     """Animated GIF, without end, of one palette, not dithered: skin would crawl. Where it comes from is its comment."""
-    from PIL import Image
-
-    pictures = [Image.fromarray(frame) for frame in frames]
-    sample = np.concatenate(frames[:: max(1, len(frames) // 6)])  # of the whole way
-    palette = Image.fromarray(sample).quantize(COLOURS, Image.Quantize.MEDIANCUT, kmeans=1)
-    first, *others = (
-        picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures
-    )
+    palette = _palette(np.concatenate(frames[:: max(1, len(frames) // 6)]))  # of the whole way
+    first, *others = (_indexed(frame, palette) for frame in frames)
     file = io.BytesIO()
     first.save(
         file, "GIF", save_all=True, append_images=others, duration=10 * round(100 / fps), loop=0,
         comment="\n".join(notes(state)).encode(),
     )  # fmt: skip
     return file.getvalue()
+
+
+def _palette(sample: Picture) -> NDArray[np.uint8]:
+    """(COLOURS, 3): the EXACT most frequent of a sample as they are, or grounds would be tinted; others chosen."""
+    from PIL import Image
+
+    colours, counts = _colours(sample)[::2]
+    exact = colours[np.argsort(-counts, kind="stable")[:EXACT]]
+    chosen = Image.fromarray(sample).quantize(
+        COLOURS - len(exact), Image.Quantize.MAXCOVERAGE, kmeans=1
+    )
+    others = np.array(chosen.getpalette() or [], np.uint8).reshape(-1, 3)
+    return np.concatenate([exact, others])[:COLOURS]
+
+
+def _indexed(frame: Picture, palette: NDArray[np.uint8]) -> Image.Image:
+    """The frame in the nearest colours of a palette; Pillow's own search is coarser and misses white."""
+    from PIL import Image
+    from scipy.spatial import cKDTree
+
+    colours, place, _ = _colours(frame)
+    nearest = cKDTree(palette).query(colours)[1].astype(np.uint8)
+    picture = Image.fromarray(nearest[place].reshape(frame.shape[:2]))
+    picture.putpalette(palette.ravel().tolist())
+    return picture
+
+
+def _colours(picture: Picture) -> tuple[NDArray[np.uint8], NDArray[np.intp], NDArray[np.intp]]:
+    """The colours (n, 3) of a picture, which of them each pixel has, and on how many pixels each is."""
+    codes = picture.reshape(-1, 3).astype(np.uint32) @ np.array([1 << 16, 1 << 8, 1], np.uint32)
+    found, place, counts = np.unique(codes, return_inverse=True, return_counts=True)
+    rgb = np.stack([found >> 16, found >> 8 & 255, found & 255], axis=1)
+    return rgb.astype(np.uint8), place, counts
