@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,30 @@ from .sheet import TONES, Sheet
 TOLERANCE = 1e-3  # metres: what lies less behind a surface is seen; marks stand above it
 MARK, RAY = 3.3, 0.7  # units: radius of a mark, width of a line
 SOLID = 0.5  # opacity from which a head hides what lies behind it
+
+
+class Ground(NamedTuple):
+    """The picture of heads that marks and lines are laid on."""
+
+    R: Array  # (3, 3) from model axes to the viewer's
+    aim: tuple[float, float]  # metres along the viewer's right and up: its middle
+    scale: float  # pixels for a metre
+    front: Array  # (H, W) metres towards the viewer that hide what lies behind
+    corner: Array  # (2,) pixels of the canvas at its upper left
+
+    def placed(self, points: Array) -> tuple[Array, Array]:
+        """Points (n, 3), metres, in viewer axes, and their pixels (n, 2) of the picture."""
+        xyz = points @ self.R.T
+        size = np.array(self.front.shape[::-1])
+        return xyz, (xyz[:, :2] - self.aim) * (self.scale, -self.scale) + 0.5 * size
+
+    def seen(self, xyz: Array, pixels: Array) -> np.ndarray:
+        """(n,) True where a point that was `placed` lies in the picture and before the surface."""
+        front = self.front
+        column, row = np.floor(pixels).astype(np.intp).T
+        inside = (column >= 0) & (row >= 0) & (column < front.shape[1]) & (row < front.shape[0])
+        nearest = front[np.where(inside, row, 0), np.where(inside, column, 0)]
+        return inside & (nearest <= xyz[:, 2] + TOLERANCE)
 
 
 def places(sheet: Sheet) -> list[list[Head]]:
@@ -55,8 +80,12 @@ def standing(
         layer.front for head, layer in zip(heads, layers, strict=True) if head.opacity >= SOLID
     ]
     front = np.max(solid, axis=0) if solid else np.full(size[::-1], -np.inf)
-    _lines(sheet, heads, R, aim, ppm * unit, front, np.array(corner))
-    _marks(sheet, heads, R, aim, ppm * unit, front, np.array(corner))
+    # A surface may stand out of its room a little, what is laid over it may not
+    edge = np.maximum((np.array(size) - np.array(room) * unit) / 2, 0).astype(np.intp)
+    front[:, : edge[0]] = front[:, size[0] - edge[0] :] = np.inf
+    ground = Ground(R, aim, ppm * unit, front, np.array(corner))
+    _lines(sheet, heads, ground)
+    _marks(sheet, heads, ground)
 
 
 def _size(
@@ -92,41 +121,16 @@ def blended(layers: Sequence[Layer], opacities: Sequence[float]) -> Picture:
     return rgba.clip(0, 255).round().astype(np.uint8)
 
 
-def _seen(xyz: Array, pixels: Array, front: Array) -> np.ndarray:
-    """(n,) True where a point (n, 3), viewer axes, at (n, 2) pixels lies in the picture and before the surface."""
-    column, row = np.floor(pixels).astype(np.intp).T
-    inside = (column >= 0) & (row >= 0) & (column < front.shape[1]) & (row < front.shape[0])
-    hidden = front[np.where(inside, row, 0), np.where(inside, column, 0)] > xyz[:, 2] + TOLERANCE
-    return inside & ~hidden
-
-
-def _placed(
-    points: Array, R: Array, aim: tuple[float, float], scale: float, front: Array
-) -> tuple[Array, Array]:
-    """Points (n, 3), metres, in viewer axes, and their pixels (n, 2) in a picture like `front`."""
-    xyz = points @ R.T
-    pixels = (xyz[:, :2] - aim) * (scale, -scale) + (0.5 * front.shape[1], 0.5 * front.shape[0])
-    return xyz, pixels
-
-
-def _marks(
-    sheet: Sheet,
-    heads: Sequence[Head],
-    R: Array,
-    aim: tuple[float, float],
-    scale: float,
-    front: Array,
-    corner: Array,
-) -> None:
-    shown = {head.name for head in heads}
-    unit = sheet.canvas.unit
+def _marks(sheet: Sheet, heads: Sequence[Head], ground: Ground) -> None:
+    """Those landmarks that no surface hides, as large at every zoom."""
+    shown, unit = {head.name for head in heads}, sheet.canvas.unit
     nothing = np.zeros((0, 2))
     for mark in sheet.scene.marks:
         if mark.head not in shown or not len(mark.points):
             continue
-        xyz, pixels = _placed(mark.points, R, aim, scale, front)
-        seen = _seen(xyz, pixels, front)
-        at = pixels[seen] + corner
+        xyz, pixels = ground.placed(mark.points)
+        seen = ground.seen(xyz, pixels)
+        at = pixels[seen] + ground.corner
         crosses, circles = (at, nothing) if mark.tone == "seen" else (nothing, at)
         crosses_and_circles(sheet.canvas, crosses, circles, MARK * unit)
         if mark.names:
@@ -134,30 +138,22 @@ def _marks(
             names(sheet.canvas, at / unit, words, MARK)
 
 
-def _lines(
-    sheet: Sheet,
-    heads: Sequence[Head],
-    R: Array,
-    aim: tuple[float, float],
-    scale: float,
-    front: Array,
-    corner: Array,
-) -> None:
+def _lines(sheet: Sheet, heads: Sequence[Head], ground: Ground) -> None:
     """Lines cut into short pieces; of each, the runs that nothing hides."""
     shown = {head.name for head in heads}
     for lines in sheet.scene.lines:
         if lines.head not in shown or not len(lines.segments):
             continue
-        ends = _placed(lines.segments.reshape(-1, 3), R, aim, scale, front)[1].reshape(-1, 2, 2)
+        ends = ground.placed(lines.segments.reshape(-1, 3))[1].reshape(-1, 2, 2)
         longest = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max())
         share = np.linspace(0.0, 1.0, 2 + int(min(longest, 4096.0) / 3))[None, :, None]
         a, b = lines.segments[:, :1], lines.segments[:, 1:]
         points = a + share * (b - a)
-        xyz, pixels = _placed(points.reshape(-1, 3), R, aim, scale, front)
-        seen = _seen(xyz, pixels, front).reshape(points.shape[:2])
+        xyz, pixels = ground.placed(points.reshape(-1, 3))
+        seen = ground.seen(xyz, pixels).reshape(points.shape[:2])
         runs = []
-        for row, visible in zip(pixels.reshape(*points.shape[:2], 2) + corner, seen, strict=True):
-            edges = np.flatnonzero(np.diff(np.concatenate([[0], visible.view(np.int8), [0]])))
-            runs += [row[[i, j - 1]] for i, j in edges.reshape(-1, 2).tolist()]
+        for row, visible in zip(pixels.reshape(*seen.shape, 2) + ground.corner, seen, strict=True):
+            turns = np.flatnonzero(np.diff(np.concatenate([[0], visible.view(np.int8), [0]])))
+            runs += [row[[i, j - 1]] for i, j in turns.reshape(-1, 2).tolist() if j - i > 1]
         width = RAY if lines.name == "rays" else 2 * RAY
         polylines(sheet.canvas, runs, TONES[lines.tone], width)

@@ -151,7 +151,7 @@ def names(canvas: Canvas, points: Array, words: Sequence[str], radius: float) ->
             box = (left, top, left + wide, top + NAME)
             if not any(_meet(box, other) for other in taken):
                 taken.append(box)
-                canvas.text(left, top + 0.85 * NAME, word, NAME, INK)
+                canvas.text(left, top + 0.85 * NAME, word, NAME, INK, halo=HALO)
                 break
 
 
