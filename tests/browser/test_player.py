@@ -132,9 +132,8 @@ def test_difference_is_drawn_in_the_colours_of_its_scale(opened: Open):
     assert bar is not None
     scale = bar["width"] / 0.05  # pixels a metre
     facing = vertex_normals(face.vertices, model.faces)[:, 2] > 0.985
-    in_front = (
-        face.vertices[:, 2] > 0.0
-    )  # of the eyes: nothing of the face is before forehead, nose and chin
+    # A centimetre before the eyes: nothing hides forehead, nose and chin, and no pupil shares a pixel with its white
+    in_front = face.vertices[:, 2] > 0.01
     chosen = np.flatnonzero(facing & in_front)
     offset = (face.vertices[chosen] - pivot(model))[:, :2] * scale
     x = np.round(picture.shape[1] / 2 + offset[:, 0]).astype(int)
