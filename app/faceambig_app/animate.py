@@ -177,7 +177,7 @@ def _palette(sample: Picture) -> NDArray[np.uint8]:
     """(COLOURS, 3): the EXACT most frequent of a sample as they are, or grounds would be tinted; others chosen."""
     from PIL import Image
 
-    colours, counts = _colours(sample)[::2]
+    colours, _, counts = _colours(sample)
     exact = colours[np.argsort(-counts, kind="stable")[:EXACT]]
     chosen = Image.fromarray(sample).quantize(
         COLOURS - len(exact), Image.Quantize.MAXCOVERAGE, kmeans=1
@@ -192,7 +192,7 @@ def _indexed(frame: Picture, palette: NDArray[np.uint8]) -> Image.Image:
     from scipy.spatial import cKDTree
 
     colours, place, _ = _colours(frame)
-    nearest = cKDTree(palette).query(colours)[1].astype(np.uint8)
+    nearest = np.asarray(cKDTree(palette).query(colours)[1], dtype=np.uint8)
     picture = Image.fromarray(nearest[place].reshape(frame.shape[:2]))
     picture.putpalette(palette.ravel().tolist())
     return picture

@@ -128,7 +128,9 @@ def test_numbers_are_those_of_the_pipeline():
 
 def test_the_equivalent_lens_sees_the_same_diagonal():
     record = json.loads(export.files(STATE, "json")[1])
-    width, height = pipeline.photograph(STATE.target).observation.image_size
+    size = pipeline.photograph(STATE.target).observation.image_size
+    assert size is not None
+    width, height = size
     film = 2 * np.arctan(np.hypot(36, 24) / 2 / record["focal_35mm"])
     assert film == pytest.approx(2 * np.arctan(np.hypot(width, height) / 2 / record["focal_px"]))
     far = json.loads(export.files(changed(STATE, camera="orthographic"), "json")[1])
@@ -215,7 +217,9 @@ def photo_of(html: str) -> np.ndarray:
     data = re.search(r'src="data:image/jpeg;base64,([^"]+)"', html)
     assert data is not None
     raw = np.frombuffer(base64.b64decode(data[1]), np.uint8)
-    return cv2.imdecode(raw, cv2.IMREAD_COLOR)[..., ::-1]
+    picture = cv2.imdecode(raw, cv2.IMREAD_COLOR)
+    assert picture is not None
+    return picture[..., ::-1]
 
 
 def test_the_page_leaves_an_own_photo_out_unless_asked(monkeypatch):

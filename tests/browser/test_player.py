@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -34,7 +35,7 @@ def opened(browser: Browser, file: Path) -> Iterator[Open]:
     """Opens the page offline; its console must stay clean and its only request be the file itself."""
     pages, problems, asked = [], [], []
 
-    def go(width: int = 800, height: int = 600, **context: str) -> Page:
+    def go(width: int = 800, height: int = 600, **context: Any) -> Page:
         page = browser.new_context(
             viewport={"width": width, "height": height}, offline=True, **context
         ).new_page()
@@ -54,7 +55,7 @@ def opened(browser: Browser, file: Path) -> Iterator[Open]:
 
 
 def numbers(page: Page) -> tuple[str, str, str]:
-    return tuple(page.inner_text(f"#{name}") for name in ("place", "d_l", "d_s"))
+    return page.inner_text("#place"), page.inner_text("#d_l"), page.inner_text("#d_s")
 
 
 def expected(state: ViewState, place: str) -> tuple[str, str, str]:
@@ -67,9 +68,11 @@ def half(page: Page, right: bool) -> np.ndarray:
     box = page.locator("#heads").bounding_box()
     assert box is not None
     width = box["width"] / 2
-    clip = {"x": box["x"] + right * width, "y": box["y"], "width": width, "height": box["height"]}
-    raw = np.frombuffer(page.screenshot(clip=clip), np.uint8)
-    return cv2.imdecode(raw, cv2.IMREAD_COLOR)[..., ::-1].astype(int)
+    left = box["x"] + right * width
+    seen = page.screenshot(clip={"x": left, "y": box["y"], "width": width, "height": box["height"]})
+    picture = cv2.imdecode(np.frombuffer(seen, np.uint8), cv2.IMREAD_COLOR)
+    assert picture is not None
+    return picture[..., ::-1].astype(int)
 
 
 def at_rest(page: Page, stop: int, track: str = "distance") -> None:
