@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import random
+from collections.abc import Iterator
 from functools import cache
 from typing import Any
 
@@ -69,3 +71,41 @@ def states(draw: st.DrawFn) -> ViewState:
     """States, some with pins."""
     pins = draw(st.lists(alone(4), max_size=draw(st.sampled_from([0, 0, 1, 5]))))
     return changed(draw(alone()), pins=pins)
+
+
+def random_states(number: int, seed: int) -> Iterator[ViewState]:
+    """Many states, most fields set: they do not shrink, but cost a twentieth of drawn ones."""
+    rng = random.Random(seed)
+    for _ in range(number):
+        pins = [_random(rng, rng.random()) for _ in range(rng.choice((0, 0, 1, 2, 5)))]
+        yield changed(_random(rng, rng.random()), pins=pins)
+
+
+def _random(rng: random.Random, share: float) -> ViewState:
+    chosen = {"view": "three_quarter", "orbit": None}
+    names = (name for name in FIELDS if rng.random() < share)
+    return made(chosen | {name: _random_value(rng, FIELDS[name]) for name in names})
+
+
+def _random_value(rng: random.Random, field: Field) -> Any:
+    low, high = field.low, field.high
+    match field.kind:
+        case "number":
+            return rng.choice([low, high, rng.uniform(low, high), round(rng.uniform(low, high), 2)])
+        case "whole" | "subject" | "index":
+            return rng.randint(int(low), int(high))
+        case "choice":
+            return rng.choice(field.choices)
+        case "names":
+            return rng.sample(field.choices, rng.randint(0, len(field.choices)))
+        case "name":
+            return rng.choice(["embedded", "ict", "a b/\u00fc.npz", "-x", "50%&=#+?"])
+        case "modes":
+            return [
+                (mode, rng.uniform(-10, 10))
+                for mode in rng.sample(range(1, 101), rng.randint(0, 3))
+            ]
+        case "orbit":
+            return rng.uniform(-400, 400), rng.uniform(low, high)
+        case "pins":
+            return ()

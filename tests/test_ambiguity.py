@@ -89,18 +89,18 @@ def test_its_script_draws_one_picture(tools, monkeypatch, capsys, tmp_path, name
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["curves", "errors"])
 def test_its_plots_are_those_drawn(tools, name):
-    like_docs(f"ambiguity_{name}.png", tools("ambiguity_pictures").PICTURES[name]())
+    like_docs(f"ambiguity_{name}.png", tools("ambiguity").PICTURES[name]())
 
 
 @pytest.mark.slow
 @pytest.mark.gl
 def test_its_heads_are_those_drawn(tools):
     scenes.need_renderer()
-    like_docs("ambiguity_spread.png", tools("ambiguity_pictures").PICTURES["spread"]())
+    like_docs("ambiguity_spread.png", tools("ambiguity").PICTURES["spread"]())
 
 
 def test_it_shows_every_picture_of_the_script(tools):
-    drawn = {f"ambiguity_{name}.png" for name in tools("ambiguity_pictures").PICTURES}
+    drawn = {f"ambiguity_{name}.png" for name in tools("ambiguity").PICTURES}
     assert drawn == set(re.findall(r"\]\((ambiguity_\w+\.png)\)", PAGE))
     assert drawn == {path.name for path in (ROOT / "docs").glob("ambiguity_*.png")}
 

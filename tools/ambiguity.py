@@ -15,11 +15,23 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 
 import numpy as np
 
+import ambiguity_curves as curves
+import ambiguity_heads as heads
+import ambiguity_numbers as numbers
 from ambiguity_page import rewritten
-from ambiguity_pictures import PICTURES
 from faceambig.render.overlay import encode_png
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
+PICTURES = {
+    "curves": curves.curves,
+    "faces": heads.faces,
+    "errors": curves.errors,
+    "mode_orthographic": lambda: heads.bent(None),
+    "mode_perspective": lambda: heads.bent(numbers.ACTUAL[0]),
+    "distance": curves.distances,
+    "spread": heads.spread,
+    "extremes": heads.extremes,
+}
 
 
 def main() -> None:

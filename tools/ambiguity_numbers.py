@@ -21,9 +21,7 @@ LOW = 0.01  # px^2: the paper's low weight of the prior; the library's own is 1,
 SUBJECT = 3  # of all pictures of one face
 PHOTOGRAPHS = (0.3, 1.0, 3.0)  # metres, those whose distance is guessed
 NOISE = 1.0  # of their points, % of the eye distance per coordinate
-CLICKED = (
-    HUMAN_TOLERANCE_PERCENT / 1.2533
-)  # of two people's points: a mean distance, as sd per coordinate
+CLICKED = HUMAN_TOLERANCE_PERCENT / 1.2533  # of two people's: a mean distance as sd per coordinate
 SEED = 1
 EXTREME = 0.6  # metres
 BENT_MM = 10.0  # the paper's weight of flexibility modes
@@ -60,7 +58,9 @@ class Modes:
     distance: float | None  # metres; None: orthographic
     words: str
     limit: float  # largest |alpha| of a plausible face
-    faces: tuple[Bent, ...]  # -10 mm, the two ends of the plausible range about the fit, +10 mm
+    faces: tuple[
+        Bent, ...
+    ]  # -10 mm, the lower end of the plausible range, the fit, the upper end, +10 mm
 
 
 @cache
@@ -151,3 +151,17 @@ def extremes(pose: str) -> fa.ExtremeFaces:
     """The two extreme faces of one photograph at 3 %."""
     seen = fa.observe(model().subject(SUBJECT), distance=EXTREME)
     return fa.extreme_faces(model(), fa.fit(model(), seen, distance=EXTREME), pose=pose)
+
+
+def said(distance: float | None) -> str:
+    """Centimetres below a metre, metres above, of two digits."""
+    if distance is None:
+        return "far away"
+    return f"{100 * distance:.0f} cm" if distance < 0.995 else f"{distance:.2g} m"
+
+
+def between(interval: fa.DistanceInterval) -> str:
+    """The ends of an interval, one of them may be open."""
+    if interval.high is None:
+        return f"from {said(interval.low)}, no end"
+    return f"{said(interval.low)} to {said(interval.high)}"

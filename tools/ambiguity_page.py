@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 import ambiguity_numbers as numbers
-import faceambig as fa
+from ambiguity_numbers import between, said
 from faceambig.arrays import Array
 from faceambig.metrics import HUMAN_TOLERANCE_PERCENT
 
@@ -204,19 +204,6 @@ def leasts(means: Array) -> list[str]:
 def table(titles: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     lines = [titles, ["---"] * len(titles), *rows]
     return "\n".join(f"| {' | '.join(line)} |".replace("  ", " ") for line in lines)
-
-
-def said(distance: float | None) -> str:
-    """Centimetres below a metre, metres above, of two digits."""
-    if distance is None:
-        return "far away"
-    return f"{100 * distance:.0f} cm" if distance < 0.995 else f"{distance:.2g} m"
-
-
-def between(interval: fa.DistanceInterval) -> str:
-    if interval.high is None:
-        return f"from {said(interval.low)}, no end"
-    return f"{said(interval.low)} to {said(interval.high)}"
 
 
 BLOCKS: dict[str, Callable[[], str]] = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -9,7 +10,7 @@ import cv2
 import numpy as np
 
 from faceambig.arrays import Array
-from faceambig.render.canvas import Canvas, Colour
+from faceambig.render.canvas import THIN, Canvas, Colour
 from faceambig.render.plots import BAND, DIM, LINE
 
 DASH, DOTS = (6.0, 3.0), (2.0, 3.0)
@@ -145,3 +146,8 @@ def pale(colour: Colour, white: float = PALE) -> Colour:
     """The colour mixed with white."""
     r, g, b = (round(part + white * (255 - part)) for part in colour)
     return r, g, b
+
+
+def thin(words: str) -> str:
+    """Words with a thin space before the unit of a distance."""
+    return re.sub(r"(?<=\d) (?=c?m\b)", THIN, words)

@@ -98,7 +98,7 @@ _ROWS = (
     ),
     Field("view", "choice", "look", "where the viewer stands", choices=VIEWS, view=True),
     Field(
-        "orbit", "orbit", "look", "azimuth,elevation of the viewer, of --view free",
+        "orbit", "orbit", "look", "the viewer of --view free: azimuth,elevation as in --orbit=-30,10; elevation",
         -90, 90, unit="deg", view=True,
     ),
     Field("zoom", "number", "look", "of the view", 0.5, 4, step=0.1, view=True),

@@ -150,8 +150,7 @@ def _pin(text: str) -> ViewState:
         field = FIELDS.get(name)
         if field is None or name == "model" or field.part in ("look", "page"):
             raise ValueError(f"pins: {item!r:.60} is not a setting of a face and its value")
-        if name in given and field.kind != "modes":
-            raise ValueError(f"pins: {name} stands there twice")
+        # Only modes are several: "1,2", of a name that stands there twice, is no value of another field
         given.setdefault(name, []).append(value)
     values = {name: value_of(FIELDS[name], ",".join(items)) for name, items in given.items()}
     return ViewState(**values)

@@ -7,7 +7,7 @@ does not depend on the way the slider took.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -270,10 +270,15 @@ def write_all(files: Mapping[Path, bytes]) -> None:
 
     ValueError says why not; of a full disk nothing is left.
     """
+    write_pairs(files.items())
+
+
+def write_pairs(files: Iterable[tuple[Path, bytes]]) -> None:
+    """As `write_all`; the files are taken one after the other, so that they need not be in memory together."""
     path = None
     try:
         with ExitStack() as stack:
-            for path, data in files.items():
+            for path, data in files:
                 stack.enter_context(replacing(path)).write_bytes(data)
     except OSError as error:
         raise ValueError(f"out: cannot write {str(path)!r}: {error.strerror}") from error

@@ -1,4 +1,4 @@
-"""Readers: a file becomes a FaceModel or landmarks. Each is chosen by what the file holds, not by its name alone."""
+"""Readers: a file becomes a FaceModel, landmarks or a fit, chosen by what it holds, not by its name alone."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from ..arrays import Array
 from ..errors import AssetError
 from ..model import FaceModel
 from .files import asset_path
+from .fits import load_fit, save_fit
 from .ict import is_ict, read_ict
 from .landmarks import LandmarkFile, load_landmarks, save_landmarks
 from .npz import is_npz_model, read_npz, save_model
@@ -21,8 +22,10 @@ from .schemes import MEDIAPIPE, mediapipe_scheme
 __all__ = [
     "LandmarkFile",
     "asset_path",
+    "load_fit",
     "load_landmarks",
     "load_model",
+    "save_fit",
     "save_landmarks",
     "save_model",
 ]

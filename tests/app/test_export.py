@@ -18,7 +18,7 @@ import pytest
 from faceambig.arrays import vertex_normals
 from faceambig.compose import skin
 from faceambig.io.meshes import linear
-from faceambig_app import export, pipeline, player, stage, standalone, tracks
+from faceambig_app import export, heads, pipeline, player, stage, standalone, tracks
 from faceambig_app.forms import from_json, to_json
 from faceambig_app.packing import TOLERANCE_MM, directions, packed, restored, rounded, step_of
 from faceambig_app.state import ViewState, changed
@@ -347,7 +347,7 @@ def test_a_swing_bends_as_the_page_does():
 
 def test_light_of_the_page_and_of_the_file_are_one():
     assert tuple(light[1:] for light in stage.LIGHTS) == player.LIGHTS
-    assert player.OCCLUSION_POWER == stage.OCCLUSION_POWER
+    assert player.OCCLUSION_POWER == heads.OCCLUSION_POWER
 
 
 def test_distances_hold_what_was_asked_for_and_no_step_of_nothing():

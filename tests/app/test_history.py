@@ -39,13 +39,13 @@ def test_one_drag_is_one_step():
 
 
 def test_a_step_closes_400_ms_after_its_last_change():
-    first = change(History(), at(0.3), 10.0)
-    assert len(change(first, at(0.4), 10.375).past) == 1
-    assert len(change(first, at(0.4), 10.4).past) == 2
-    long = change(change(first, at(0.4), 10.375), at(0.5), 10.75)  # 0.75 s, but no pause in it
+    first = change(History(), at(0.3), 0.0)
+    assert len(change(first, at(0.4), 0.399).past) == 1
+    assert len(change(first, at(0.4), 0.4).past) == 2
+    long = change(change(first, at(0.4), 0.375), at(0.5), 0.75)  # 0.75 s, but no pause in it
     assert long.past == (DEFAULT,)
-    same = change(first, first.now, 10.3)  # nothing changed: the step is not kept open by it
-    assert len(change(same, at(0.4), 10.4).past) == 2
+    same = change(first, first.now, 0.3)  # nothing changed: the step is not kept open by it
+    assert len(change(same, at(0.4), 0.4).past) == 2
 
 
 def test_undo_closes_a_step():

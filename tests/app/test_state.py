@@ -7,7 +7,7 @@ from typing import Any
 
 import msgspec
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from faceambig_app.fields import canonical
@@ -38,6 +38,7 @@ def test_the_table_names_every_field_of_the_state_and_only_those():
         assert field.help
 
 
+@settings(max_examples=50)
 @given(states())
 def test_json_gives_the_same_state_back(state):
     assert msgspec.json.decode(msgspec.json.encode(state), type=ViewState) == state
@@ -62,6 +63,7 @@ def test_json_that_is_no_state_is_refused(text, words):
         msgspec.json.decode(text, type=ViewState)
 
 
+@settings(max_examples=50)
 @given(states(), st.sampled_from(sorted({*FIELDS} - {"view", "orbit", "pins", "model"})), st.data())
 def test_a_change_changes_its_field_alone(state, name, data):
     value = data.draw(values(FIELDS[name]))
@@ -70,6 +72,7 @@ def test_a_change_changes_its_field_alone(state, name, data):
     assert changed(after, **{name: getattr(state, name)}) == state
 
 
+@settings(max_examples=50)
 @given(states())
 def test_equal_states_are_one_key(state):
     twin = changed(state)
@@ -240,6 +243,7 @@ def test_what_may_not_stand_there_is_refused_in_one_line(name, bad, words):
         new(**{name: bad})
 
 
+@settings(max_examples=50)
 @given(alone())
 def test_a_pin_is_the_face_alone(state):
     pin = short(state)

@@ -26,17 +26,19 @@ def add_state(command: argparse.ArgumentParser) -> None:
     )
     for field in FIELDS.values():
         command.add_argument(
-            field.flag, dest=field.name, metavar=field.name.upper(), help=_help(field)
+            field.flag, dest=field.name, metavar=field.name.upper(), help=help_of(field)
         )
 
 
-def _help(field: Field) -> str:
+def help_of(field: Field, also: str = "") -> str:
     """What a flag sets, its range or choices, its default."""
     within = f"{field.low:g} to {field.high:g}" if field.high < float("inf") else ""
     told = " ".join(filter(None, (within, field.unit))) or ", ".join(map(str, field.choices))
     default = text_of(field, getattr(DEFAULT, field.name))
     ranged = f" [{told}]" if told else ""
-    return f"{field.help}{ranged} (default {default})".replace("%", "%%")  # argparse fills in %
+    return f"{field.help}{also}{ranged} (default {default})".replace(
+        "%", "%%"
+    )  # argparse fills in %
 
 
 def run(options: argparse.Namespace) -> int:
