@@ -16,15 +16,10 @@ import pytest
 
 from faceambig.errors import AssetError
 from faceambig_app import panel, text
-<<<<<<< HEAD
 from faceambig_app.actions import ACTIONS
 from faceambig_app.guard import page
 from faceambig_app.panel import compare, explore, flex, view, widgets
 from faceambig_app.state import DEFAULT
-=======
-from faceambig_app.guard import page
-from faceambig_app.state import DEFAULT, FIELDS
->>>>>>> j
 from faceambig_app.text import centimetres, distance_text, percent_number, say, words
 
 ROOT = Path(__file__).parents[2]
@@ -90,21 +85,12 @@ def test_every_word_of_the_file_is_asked_for(recorded):
     shown = panel.Panel(MagicMock(), {1: "a"}, lambda _: None, lambda _: None, narrow=False)
     shown.spoken(DEFAULT)
     exact = {ask.replace("\\", "") for _, ask in ASKED if "[" not in ask}
-<<<<<<< HEAD
     commands = {f"action.{name}{end}" for name in ACTIONS for end in ("", "_hint")}
     # whole sections go to the page's script
     whole = set(re.findall(r'words\(\)\["(\w+)"\]', inspect.getsource(page)))
     scripted = {key for key in KEYS if key.split(".")[0] in whole}
     assert KEYS - exact - recorded - commands - scripted == set()
     assert (exact | recorded | commands) - KEYS == set()
-=======
-    views = {f"view.{name}" for name in FIELDS["view"].choices}
-    # whole sections go to the page's script
-    whole = set(re.findall(r'words\(\)\["(\w+)"\]', inspect.getsource(page)))
-    scripted = {key for key in KEYS if key.split(".")[0] in whole}
-    assert KEYS - exact - recorded - views - scripted == set()
-    assert (exact | recorded | views) - KEYS == set()
->>>>>>> j
 
 
 def test_every_call_fills_in_the_names_its_words_have():
