@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 import faceambig.io as fio
 from faceambig.errors import AssetError
-from faceambig.io.npz import MAX_BYTES
+from faceambig.io.files import MAX_BYTES
 from faceambig.metrics import surface_difference
 from faceambig.model import FaceModel
 from strategies import tiny_model
