@@ -42,4 +42,4 @@ def shaped(name: str, flat: NDArray[Any]) -> NDArray[Any]:
 def nearest(mean: Array, points: Array) -> tuple[IntArray, Array]:
     """The vertex of `mean` (N, 3) nearest to each of `points` (L, 3), and how far it is."""
     away, vertices = cKDTree(mean).query(points)
-    return vertices, away
+    return np.asarray(vertices, dtype=np.intp), np.asarray(away)
