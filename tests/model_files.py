@@ -1,7 +1,7 @@
 """Small files of other models' formats, written as docs/models.md describes them, with made-up numbers.
 
-The mean is a bumpy egg with the eye corners of an adult; vertex numbers of landmarks come from our scheme files, so that
-a file of full size has eyes where the reader looks for them.
+The mean is an egg with the eye corners of an adult; vertex numbers of landmarks come from our scheme files, so that a
+file of full size has eyes where the reader looks for them.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from typing import Any
 import numpy as np
 import scipy.io
 
+import faceambig.io as fio
+from faceambig.errors import AssetError
 from faceambig.io.files import asset_path
 from faceambig.io.schemes import load_scheme
 
@@ -73,7 +75,9 @@ def drawn(n: int = 42, s: int = 3, eyes: Mapping[str, int] | None = None) -> Dra
 def eyes_of(scheme: str) -> dict[str, int]:
     """Vertices of the eye points in one of our scheme files."""
     read = load_scheme(asset_path(f"schemes/{scheme}.csv"), "ibug68")
-    return {point: int(v) for point, v in zip(read.points, read.vertices, strict=True) if point in EYES}
+    return {
+        point: int(v) for point, v in zip(read.points, read.vertices, strict=True) if point in EYES
+    }
 
 
 # eos
@@ -98,19 +102,36 @@ def write_eos(
 ) -> Path:  # fmt: skip
     """An eos file; expressions: none, pca or blendshapes."""
     n = len(model.mean)
-    shape = [eos_matrix(model.mean.reshape(-1, 1)), eos_matrix(model.basis), eos_matrix(model.sds[:, None] ** 2)]
+    shape = [
+        eos_matrix(model.mean.reshape(-1, 1)),
+        eos_matrix(model.basis),
+        eos_matrix(model.sds[:, None] ** 2),
+    ]
     triangles = eos_list(model.faces, "<i4")
-    nothing = [eos_matrix(np.zeros((0, 1))), struct.pack("<ii", 0, 0), eos_matrix(np.zeros((0, 1))), struct.pack("<Q", 0)]
+    nothing = [
+        eos_matrix(np.zeros((0, 1))),
+        struct.pack("<ii", 0, 0),
+        eos_matrix(np.zeros((0, 1))),
+        struct.pack("<Q", 0),
+    ]
     parts = [struct.pack("<I", version), *shape, triangles]
-    parts += [eos_matrix(model.colours.reshape(-1, 1)), *shape[1:], triangles] if colours else nothing
+    parts += (
+        [eos_matrix(model.colours.reshape(-1, 1)), *shape[1:], triangles] if colours else nothing
+    )
     if version >= 2:
-        blend = struct.pack("<Q", 2) + b"".join(eos_text(t) + eos_matrix(np.zeros((3 * n, 1))) for t in ("smile", "o"))
+        blend = struct.pack("<Q", 2) + b"".join(
+            eos_text(t) + eos_matrix(np.zeros((3 * n, 1))) for t in ("smile", "o")
+        )
         kinds = {"none": b"\x01", "pca": b"\x00" + struct.pack("<i", 0) + b"".join([*shape, triangles]),
                  "blendshapes": b"\x00" + struct.pack("<i", 1) + blend}  # fmt: skip
         parts.append(kinds[expressions])
     if version >= 3:
-        rows = b"".join(eos_text(name) + struct.pack("<i", v) for name, v in (landmarks or {}).items())
-        parts.append(b"\x01" if landmarks is None else b"\x00" + struct.pack("<Q", len(landmarks)) + rows)
+        rows = b"".join(
+            eos_text(name) + struct.pack("<i", v) for name, v in (landmarks or {}).items()
+        )
+        parts.append(
+            b"\x01" if landmarks is None else b"\x00" + struct.pack("<Q", len(landmarks)) + rows
+        )
     parts.append(eos_list(np.zeros((n, 2)), "<f8"))
     if version >= 4:
         parts.append(triangles)
@@ -140,11 +161,17 @@ def write_basel(path: Path, model: Drawn, *, compressed: bool = False, **changes
 def write_farkas(path: Path, model: Drawn, points: Mapping[str, int], off_mm: float = 0.0) -> Path:
     """The points of Farkas in the layout of Basel's `.fp` files, micrometres."""
     rows = [
-        "{} {:.3f} {:.3f} {:.3f} 0.5 0.5 {}".format(v, *(1e3 * (model.mean[v] + off_mm)).tolist(), name)
+        "{} {:.3f} {:.3f} {:.3f} 0.5 0.5 {}".format(
+            v, *(1e3 * (model.mean[v] + off_mm)).tolist(), name
+        )
         for name, v in points.items()
     ]
     path.parent.mkdir(parents=True, exist_ok=True)
-    header = ["File of points", f"Points {len(rows)} all", "Format: (vertex_nr) (x y z) (x y) (name)"]
+    header = [
+        "File of points",
+        f"Points {len(rows)} all",
+        "Format: (vertex_nr) (x y z) (x y) (name)",
+    ]
     path.write_text("\n".join([*header, *rows]) + "\n")
     return path
 
@@ -174,7 +201,10 @@ def write_statismo(
         basis = model.basis * model.sds if legacy else model.basis
         shape = part(root, factor * model.mean, basis, (factor * model.sds) ** 2)
         if version is not None:
-            shape["version/majorVersion"], shape["version/minorVersion"] = version[0], np.array([version[1]])
+            shape["version/majorVersion"], shape["version/minorVersion"] = (
+                version[0],
+                np.array([version[1]]),
+            )
         mesh = shape.require_group("representer")
         mesh.attrs["name"] = np.array([representer.encode() + b"\x00"])  # as older files have it
         mesh.attrs["datasetType"] = "POLYGON_MESH"
@@ -189,7 +219,9 @@ def write_statismo(
         if expression is not None:
             part("expression", expression, model.basis, np.ones(model.basis.shape[1]))
         if landmarks is not None:
-            items = [{"id": k, "coordinates": (factor * at).tolist()} for k, at in landmarks.items()]
+            items = [
+                {"id": k, "coordinates": (factor * at).tolist()} for k, at in landmarks.items()
+            ]
             file["metadata/landmarks/json"] = np.frombuffer(json.dumps(items).encode(), np.int8)
         if change is not None:
             change(file)
@@ -210,7 +242,12 @@ class Csc:
     """Stands for a matrix of SciPy: written as scipy.sparse.csc.csc_matrix."""
 
     def __init__(self, n: int) -> None:
-        self.data, self.indices, self.indptr, self._shape = np.ones(5), np.arange(5), np.arange(n + 1) % 6, (5, n)
+        self.data, self.indices, self.indptr, self._shape = (
+            np.ones(5),
+            np.arange(5),
+            np.arange(n + 1) % 6,
+            (5, n),
+        )
 
 
 Ch.__module__, Csc.__module__, Csc.__qualname__ = "chumpy.ch", "scipy.sparse.csc", "csc_matrix"
@@ -220,7 +257,7 @@ Csc.__name__ = "csc_matrix"
 def pickled(value: Any, protocol: int) -> bytes:
     """The pickle of a value with the two classes above, which no import would find."""
     import sys
-    from pickle import Pickler
+    from pickle import Pickler  # noqa: TID251 - written here, read by our own reader
     from types import ModuleType
 
     stands = {"chumpy": {}, "chumpy.ch": {"Ch": Ch}, "scipy.sparse.csc": {"csc_matrix": Csc}}
@@ -301,3 +338,32 @@ def write_gnm(path: Path, model: Drawn, rows: np.ndarray | None = None) -> Path:
         lines = [" ".join(f"{x:.9g}" for x in row) for row in rows]
         (path.parent / "head_sparse_68.txt").write_text("\n".join(lines) + "\n")
     return path
+
+
+# Damage
+
+
+def damages(size: int) -> Any:
+    """A strategy: up to five bytes of a file changed, or its end cut off; always something of either."""
+    from hypothesis import strategies as st
+
+    change = st.tuples(st.integers(0, size - 1), st.integers(0, 255))
+    return st.tuples(st.lists(change, min_size=1, max_size=5), st.none() | st.integers(0, size - 1))
+
+
+def read_damaged(path: Path, data: bytes, damage: tuple[list[tuple[int, int]], int | None]) -> None:
+    """Load the damaged `data`: an error of one line that names the file, or a model of finite numbers; nothing else."""
+    changed = bytearray(data)
+    for at, value in damage[0]:
+        changed[at] = value
+    path.write_bytes(bytes(changed[: damage[1]]))
+    said = ""
+    try:
+        model = fio.load_model(path, origin="file")
+    except AssetError as error:
+        said = str(error)
+    else:
+        assert np.isfinite(model.mean).all()
+        assert np.isfinite(model.control_modes).all()
+    assert "\n" not in said
+    assert not said or path.name in said

@@ -118,7 +118,7 @@ def _sds(values: NDArray[Any]) -> Array:
         raise AssetError(f"standard deviations: {sds.min():.3g} is not positive")
     if (sds[1:] > sds[:-1] * (1 + RISING)).any():
         k = int(np.argmax(sds[1:] > sds[:-1] * (1 + RISING)))
-        raise AssetError(f"standard deviations: mode {k + 1} is stronger than mode {k}")
+        raise AssetError(f"standard deviations: mode {k + 2} is stronger than mode {k + 1}")
     return sds
 
 
