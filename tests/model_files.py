@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 import json
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -331,6 +331,25 @@ def gnm_arrays(model: Drawn) -> dict[str, np.ndarray]:
     }
 
 
+def gnm_head() -> Drawn:
+    """A head with a vertex for each of the 68 points: the jaw an arc from ear to ear, the eyes an adult's."""
+    model = drawn(120, 3)
+    turn = np.linspace(-1.5, 1.5, 17)
+    model.mean[42:59] = (
+        np.column_stack([70 * np.sin(turn), -20 - 90 * np.cos(turn), -20 * turn**2]) + HEAD_AT
+    )
+    model.mean[78:90] = np.column_stack([EYE_X, np.zeros(12), np.zeros(12)]) + HEAD_AT
+    return model
+
+
+def gnm_rows(order: Iterable[int] = range(68)) -> np.ndarray:
+    """Each point at one vertex, 42 and on; `order`: which point each line is."""
+    table = np.zeros((68, 6))
+    table[:, 0] = 42 + np.array(list(order))
+    table[:, 1] = 1.0
+    return table
+
+
 def write_gnm(path: Path, model: Drawn, rows: np.ndarray | None = None) -> Path:
     """A `gnm_head.npz`, with `rows` (68, 6) as `head_sparse_68.txt` beside it."""
     np.savez(path, **gnm_arrays(model))  # pyright: ignore[reportArgumentType]
@@ -355,7 +374,7 @@ def read_damaged(path: Path, data: bytes, damage: tuple[list[tuple[int, int]], i
     """Load the damaged `data`: an error of one line that names the file, or a model of finite numbers; nothing else."""
     changed = bytearray(data)
     for at, value in damage[0]:
-        changed[at] = value
+        changed[at % len(data)] = value
     path.write_bytes(bytes(changed[: damage[1]]))
     said = ""
     try:

@@ -18,7 +18,7 @@ from ..arrays import Array
 from ..errors import AssetError
 from ..model import FaceModel, Scheme
 from .build import Parts, build
-from .checks import nearest, shaped
+from .checks import nearest, shaped, whole_numbers
 from .files import asset_path, damage_named, text_of
 from .matlab import read_matlab
 from .schemes import EYES, schemes_in
@@ -40,9 +40,6 @@ def read_basel(path: Path) -> FaceModel:
         if missing:
             raise AssetError(f"{missing[0]} is missing; Basel 2009 has {', '.join(NAMES)}")
         mean, modes = shaped("shapeMU", arrays["shapeMU"].ravel()), arrays["shapePC"]
-        faces = arrays["tl"]
-        if faces.dtype.kind == "f" and not (faces == np.rint(faces)).all():
-            raise AssetError("tl holds numbers that are not whole")
         known = len(mean) == N_VERTICES
         colours = arrays.get("texMU")
         model = build(
@@ -51,7 +48,7 @@ def read_basel(path: Path) -> FaceModel:
                 mean=mean,
                 modes=shaped("shapePC", np.ascontiguousarray(modes)),
                 sds=arrays["shapeEV"].ravel(),
-                faces=faces.astype(np.int64) - 1,
+                faces=whole_numbers("tl", arrays["tl"]).astype(np.int64) - 1,
                 unit="micrometre",
                 schemes=schemes_in(asset_path("schemes"), "bfm2009", N_VERTICES) if known else {},
                 colours=None if colours is None else shaped("texMU", colours.ravel()),

@@ -59,15 +59,16 @@ def fits_in_memory(n_vertices: int, n_modes: int) -> None:
 
 
 def build(parts: Parts) -> FaceModel:
-    """The model of `parts` at the file's own origin, metres; AssetError if they do not fit together."""
+    """The model of `parts` at the file's own origin, metres; AssetError if they do not fit together.
+
+    Runs inside `damage_named`: what overflows makes no noise and is refused by name.
+    """
     n, _, s = _sizes(parts)
-    with np.errstate(all="ignore"):  # what overflows is refused by name
-        mean = finite("mean", parts.mean)
-        scheme = parts.schemes.get("ibug68")
-        unit, words = _unit(parts, mean, _outer(parts, mean, scheme))
-        mean = _bounded("mean", mean * unit)
-        scale = np.full(s, unit) if parts.sds is None else unit * _sds(parts.sds)
-        modes = np.multiply(parts.modes, scale, dtype=np.float64, order="C")
+    mean = finite("mean", parts.mean)
+    unit, words = _unit(parts, mean, _outer(parts, mean, parts.schemes.get("ibug68")))
+    mean = _bounded("mean", mean * unit)
+    scale = np.full(s, unit) if parts.sds is None else unit * _sds(parts.sds)
+    modes = np.multiply(parts.modes, scale, dtype=np.float64, order="C")
     faces = _outward(vertex_numbers("triangles", parts.faces, n), mean)
     model = FaceModel(
         name=parts.name,

@@ -22,6 +22,15 @@ def finite(name: str, values: NDArray[Any]) -> Array:
     return array
 
 
+def whole_numbers(name: str, values: NDArray[Any]) -> NDArray[Any]:
+    """`values` as integers, of floats too if they are whole."""
+    if values.dtype.kind != "f":
+        return values
+    if not (finite(name, values) == np.rint(values)).all():
+        raise AssetError(f"{name} holds numbers that are not whole")
+    return values.clip(-(1 << 40), 1 << 40).astype(np.int64)
+
+
 def vertex_numbers(name: str, values: NDArray[Any], end: int) -> NDArray[Any]:
     """`values`, if they are whole numbers from 0 below `end`."""
     if values.dtype.kind not in "iu":

@@ -10,6 +10,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
+
 from ..errors import AssetError
 
 # Of all arrays of a model as float64; the largest public one, 53,490 vertices and 199 modes, needs 255 MB
@@ -44,7 +46,8 @@ def text_of(path: Path) -> str:
 def damage_named(path: Path) -> Iterator[None]:
     """Whatever reading a model at `path` raises becomes an AssetError of one line that names the file."""
     try:
-        yield
+        with np.errstate(all="ignore"):  # what is not finite is refused by name
+            yield
     except AssetError as error:
         message = str(error)
         raise error if path.name in message else AssetError(f"{path.name}: {message}") from error

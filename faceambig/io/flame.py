@@ -12,13 +12,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..errors import AssetError
 from ..model import FaceModel
 from .between import points_between
 from .build import Parts, build
-from .checks import finite
+from .checks import whole_numbers
 from .files import asset_path, damage_named
 from .pickled import array_of, is_pickle, read_pickle
 from .zipped import names_in, plain_arrays
@@ -37,20 +35,16 @@ def read_flame(path: Path) -> FaceModel:
     """FLAME's identity model at its own origin; AssetError, one line, for damage or a pickle of anything else."""
     with damage_named(path):
         arrays = _unpickled(path) if is_pickle(path) else plain_arrays(path, NAMES, NAMES)
-        modes, faces = arrays["shapedirs"], arrays["f"]
+        modes = arrays["shapedirs"]
         if modes.ndim != 3:
             raise AssetError(f"shapedirs has shape {modes.shape}, expected (N, 3, S)")
-        if faces.dtype.kind == "f":
-            if not (finite("f", faces) == np.rint(faces)).all():
-                raise AssetError("f holds numbers that are not whole")
-            faces = faces.clip(-1, 1 << 40).astype(np.int64)
         known = len(arrays["v_template"]) == N_VERTICES
         return build(
             Parts(
                 name="flame" if known else "flame-like",
                 mean=arrays["v_template"],
                 modes=modes[:, :, :IDENTITY],
-                faces=faces,
+                faces=whole_numbers("f", arrays["f"]),
                 unit="m",
                 between=points_between(asset_path("schemes/flame_ibug68.csv")) if known else None,
                 licence="FLAME's model licence (flame.is.tue.mpg.de); CC BY 4.0 for the versions that say so",

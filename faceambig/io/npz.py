@@ -108,8 +108,7 @@ def read_npz(path: Path) -> FaceModel:
         members = headers(archive, KNOWN, REQUIRED)
         sizes = _agreed_sizes(members)
         arrays = {name: array(archive, member) for name, member in members.items()}
-        with np.errstate(over="ignore", invalid="ignore"):  # infinities are refused by name below
-            return _built(arrays, sizes, path)
+        return _built(arrays, sizes, path)
 
 
 def save_model(model: FaceModel, path: str | os.PathLike[str]) -> None:

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from ..errors import AssetError
 from ..model import FaceModel, Scheme
 from .build import Parts, build, fits_in_memory, sds_of_variances
-from .checks import nearest, shaped
+from .checks import finite, nearest, shaped
 from .files import MAX_BYTES, asset_path, damage_named, text_of
 from .points import cells
 from .schemes import ibug68_sides, make_scheme, schemes_in
@@ -89,8 +89,7 @@ def _parts(file: h5py.Group, root: h5py.Group, name: str) -> Parts:
     sds = sds_of_variances(_read(root, "model/pcaVariance", 1))
     columns = _values(basis)
     if _is_scaled(root):
-        with np.errstate(all="ignore"):  # zero columns and infinities are refused by name
-            columns = columns / np.linalg.norm(columns.astype(np.float64), axis=0)
+        columns = columns / np.linalg.norm(columns.astype(np.float64), axis=0)
     expression = _group(file, "expression")
     if expression is not None and _group(expression, "model") is not None:
         neutral = shaped("expression/model/mean", _read(expression, "model/mean", 1))
@@ -234,7 +233,7 @@ def _schemes(
     named = _landmarks(file) or _landmarks(root)
     if named and {name for eye in CORNERS for name in eye} <= set(named):
         at = np.array(list(named.values()))
-        vertices, away = nearest(np.asarray(mean, dtype=np.float64), at)
+        vertices, away = nearest(finite("mean", mean), at)
         if not (away < FAR).all():
             odd = list(named)[int(np.argmax(away))]
             raise AssetError(f"landmark {odd:.40} is {away.max():.3g} from the nearest vertex")
@@ -263,6 +262,8 @@ def _landmarks(group: h5py.Group) -> dict[str, list[float]]:
     try:
         text = value.decode() if isinstance(value, bytes) else value
         items = json.loads(text.rstrip("\x00"))
+        if not isinstance(items, list):
+            raise TypeError
         named = {str(item["id"]): [float(x) for x in item["coordinates"]] for item in items}
     except (ValueError, TypeError, KeyError, RecursionError) as error:
         raise AssetError(f"{where} is not a list of landmarks") from error
