@@ -277,7 +277,7 @@ def pickled(value: Any, protocol: int) -> bytes:
                 sys.modules[name] = module
 
 
-def flame_arrays(model: Drawn, expressions: int = 0) -> dict[str, np.ndarray]:
+def flame_arrays(model: Drawn, expressions: int = 0) -> dict[str, Any]:
     """The arrays of FLAME, metres; `expressions` more modes behind those of identity."""
     n = len(model.mean)
     behind = np.full((n, 3, expressions), 9.0)
@@ -311,7 +311,7 @@ def write_flame(path: Path, model: Drawn, protocol: int = 2, expressions: int = 
 # GNM
 
 
-def gnm_arrays(model: Drawn) -> dict[str, np.ndarray]:
+def gnm_arrays(model: Drawn) -> dict[str, Any]:
     """The arrays of GNM, metres: all modes of the head, and one more each of eyes and teeth."""
     n, s = len(model.mean), len(model.sds)
     other = np.ones((1, n, 3))
@@ -352,7 +352,7 @@ def gnm_rows(order: Iterable[int] = range(68)) -> np.ndarray:
 
 def write_gnm(path: Path, model: Drawn, rows: np.ndarray | None = None) -> Path:
     """A `gnm_head.npz`, with `rows` (68, 6) as `head_sparse_68.txt` beside it."""
-    np.savez(path, **gnm_arrays(model))  # pyright: ignore[reportArgumentType]
+    np.savez(path, **gnm_arrays(model))
     if rows is not None:
         lines = [" ".join(f"{x:.9g}" for x in row) for row in rows]
         (path.parent / "head_sparse_68.txt").write_text("\n".join(lines) + "\n")

@@ -7,6 +7,7 @@ import struct
 import tracemalloc
 import zlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -187,7 +188,8 @@ def bomb(name: bytes, shape: tuple[int, int], zeros: int) -> bytes:
     ],
 )
 def test_a_bomb_costs_no_memory(tmp_path, name, shape, said):
-    path = write_basel(tmp_path / "m.mat", SMALL, **{name.decode(): None})
+    changes: dict[str, Any] = {name.decode(): None}
+    path = write_basel(tmp_path / "m.mat", SMALL, **changes)
     path.write_bytes(path.read_bytes() + bomb(name, shape, 200 << 20))
     assert path.stat().st_size < 1 << 20
     tracemalloc.start()

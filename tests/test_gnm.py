@@ -69,7 +69,9 @@ def test_a_point_between_vertices_becomes_a_vertex_of_the_mesh(tmp_path):
 
 def changed(tmp_path, **changes: Any):
     path = tmp_path / "gnm_head.npz"
-    arrays = {k: v for k, v in (gnm_arrays(SMALL) | changes).items() if v is not None}
+    arrays: dict[str, Any] = {
+        k: v for k, v in (gnm_arrays(SMALL) | changes).items() if v is not None
+    }
     np.savez(path, **arrays)
     return path
 

@@ -48,7 +48,7 @@ def server(origin) -> Iterator[str]:
     """The place, served on this machine."""
 
     class Quiet(SimpleHTTPRequestHandler):
-        def log_message(self, *args: object) -> None:
+        def log_message(self, format: str, *args: object) -> None:  # noqa: A002 - the name it overrides
             pass
 
     with ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=str(origin))) as http:

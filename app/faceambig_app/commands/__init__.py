@@ -16,5 +16,5 @@ COMMANDS: tuple[tuple[str, ModuleType, str], ...] = (
     ("fit", fit, "fit a face to the points of a photograph"),
     ("sweep", sweep, "fit at many distances"),
     ("landmarks", landmarks, "find the points of a face in a photograph"),
-    ("models", models, "what a model holds: modes, landmark schemes"),
+    ("models", models, "what a model holds; convert one, install a free one"),
 )
