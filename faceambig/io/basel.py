@@ -46,7 +46,7 @@ def read_basel(path: Path) -> FaceModel:
             Parts(
                 name="bfm2009" if known else "basel",
                 mean=mean,
-                modes=shaped("shapePC", np.ascontiguousarray(modes)),
+                modes=shaped("shapePC", modes),
                 sds=arrays["shapeEV"].ravel(),
                 faces=whole_numbers("tl", arrays["tl"]).astype(np.int64) - 1,
                 unit="micrometre",
