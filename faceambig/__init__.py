@@ -16,7 +16,7 @@ from .errors import AssetError
 from .extremes import ExtremeFace, ExtremeFaces, extreme_faces
 from .fitting import Failure, Fit, FitOptions, Status, fit, fit_batch
 from .flex import FlexibilityModes, KeptModes, flexibility_modes
-from .io import load_landmarks, load_model
+from .io import load_fit, load_landmarks, load_model, save_fit
 from .model import FaceModel, Scheme, Subject
 from .observation import Observation, observe
 from .posterior import (
@@ -64,11 +64,13 @@ __all__ = [
     "fit",
     "fit_batch",
     "flexibility_modes",
+    "load_fit",
     "load_landmarks",
     "load_model",
     "observe",
     "posterior",
     "posterior_modes",
+    "save_fit",
     "shade",
     "surface_spread",
     "sweep_distance",

@@ -21,6 +21,7 @@ lie, and at last drawn towards the fit until their landmarks, projected, are wit
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, get_args
 
@@ -91,6 +92,7 @@ def extreme_faces(
     *,
     pose: Pose = "fixed",
     starts: int = 24,
+    progress: Callable[[int], object] | None = None,
 ) -> ExtremeFaces:
     """Two faces as far from a fitted one as its box and a tolerance on the landmarks allow, in opposite ways.
 
@@ -101,6 +103,7 @@ def extreme_faces(
         distance. d_L, the mean of the distances, is then below it too.
     pose: "fixed", the fit's camera sees both faces; "free", rotation, shift and scale follow, the distance is kept.
     starts: of the search for the first face, both ways along half as many directions.
+    progress: called with the number of starts done since it was last called, such as the `update` of a tqdm bar.
 
     Raises
     ------
@@ -131,7 +134,7 @@ def extreme_faces(
     low = np.minimum(-fit.options.box - fit.alpha, 0.0)
     high = np.maximum(fit.options.box - fit.alpha, 0.0)
     marks = photo.linearised(fit.alpha, fit.camera, np.zeros(S))
-    first, second = _two(marks, G, low, high, starts)
+    first, second = _two(marks, G, low, high, starts, progress)
     bound = float(np.sqrt(upper_bound(marks, G, fit.alpha, fit.options.box)))
     found = float(np.sqrt(first @ G @ first))
     one, its_camera = _true(photo, fit, G, low, high, first, np.zeros(S))
@@ -317,7 +320,14 @@ def _climb(marks: Marks, G: Array, low: Array, high: Array, c: Array) -> Array:
     return d
 
 
-def _two(marks: Marks, G: Array, low: Array, high: Array, starts: int) -> tuple[Array, Array]:
+def _two(
+    marks: Marks,
+    G: Array,
+    low: Array,
+    high: Array,
+    starts: int,
+    progress: Callable[[int], object] | None = None,
+) -> tuple[Array, Array]:
     """The largest change found, and the largest of those that point away from it."""
     S = len(G)
     # Towards what moves the surface most for what it moves of the landmarks and takes of the box
@@ -326,6 +336,8 @@ def _two(marks: Marks, G: Array, low: Array, high: Array, starts: int) -> tuple[
     found = []
     for f in F.T[::-1][: -(-starts // 2)]:
         found += [_climb(marks, G, low, high, sign * (G @ f)) for sign in (1.0, -1.0)]
+        if progress is not None:
+            progress(2)
     first = max(found, key=lambda d: float(d @ G @ d))
     found.append(_climb(marks, G, low, high, -(G @ first)))
     away = [d for d in found if d @ G @ first < 0]

@@ -213,6 +213,7 @@ def posterior(
     noise_px: float | None = None,
     tolerance: float = 1e-8,
     max_steps: int = 100,
+    progress: Callable[[int], object] | None = None,
 ) -> Posterior:
     """The faces and distances that one observation leaves open, with their probabilities.
 
@@ -232,6 +233,7 @@ def posterior(
         percent between two markings is sigma = d / 1.2533.
     noise_px: sigma in pixels itself, instead of noise_percent.
     tolerance, max_steps: as `fit`.
+    progress: as in `sweep_distance`.
 
     Raises
     ------
@@ -273,6 +275,7 @@ def posterior(
     sweep = sweep_distance(
         model, observation, grid,
         modes=modes, box=box, prior_weight=variance, tolerance=tolerance, max_steps=max_steps,
+        progress=progress,
     )  # fmt: skip
     fits = [sweep.orthographic, *sweep.fits[::-1]]
     fits, laplace = _refined(task, fits)

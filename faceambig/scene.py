@@ -36,7 +36,7 @@ class Head:
     coarse_faces: NDArray[np.uint32] | None = (
         None  # over the first vertices: the mesh while a hand moves
     )
-    opacity: float = 1.0  # below 1: a ghost, drawn over what stands in the same slot
+    opacity: float = 1.0  # below 1: a ghost; of heads in one slot the nearer surface covers the farther by this share
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,7 +66,8 @@ class View:
     name: str  # front, three_quarter, side, top, free
     azimuth_deg: float  # 0 front; positive: the viewer sees more of the subject's left side
     elevation_deg: float  # positive: from above
-    half_height: float  # metres shown above and below the centre, at zoom 1
+    half_height: float  # metres shown above and below the middle of the picture, zoom included
+    rise: float = 0.0  # metres: how far above that middle the pivot stands
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,7 +109,7 @@ class Curves:
     d_l_percent: Array  # (D,)
     d_s_mm: Array  # (D,)
     orthographic: tuple[float, float]  # d_L percent and d_S mm of the far-away camera
-    true_distance: float  # metres
+    true_distance: float  # metres; NaN: not known, or not to be told
     tolerance_percent: float  # a person cannot tell below this
     density: Array | None = None  # (D,) posterior of the distance, per octave, of largest value 1
     intervals: tuple[tuple[float, float], ...] = ()  # metres: of 50 and 95 % posterior; inf: no end
@@ -127,6 +128,7 @@ class Numbers:
     eyes_meaning: str  # the definition of d_L's unit
     flex_words: str = ""  # what the flexibility mode moves
     flex_mm: float = 0.0
+    flex: tuple[tuple[str, float], ...] = ()  # of several modes: words and mm of each
     reference: str = ""  # what d_S is measured to; empty: the true face
 
 
@@ -140,6 +142,8 @@ class Legend:
     high: float
     ticks: tuple[float, ...]
     note: str = ""  # "grey: not measured"
+    open_low: bool = False  # lower values are drawn in the first colour: "< -15" at the bar's end
+    open_high: bool = False  # higher values are drawn in the last colour: "> 15"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -161,8 +165,11 @@ class Scene:
         0.0,
         0.0,
     )  # metres, model axes: where heads are centred and turn about
-    scale_bar: float = 0.05  # metres
+    scale_bar: float = 0.05  # metres; 0: none
     note: str = ""  # one line: model, subject, what is grey
+    hide: frozenset[str] = (
+        frozenset()
+    )  # what is not told: "numbers" (their text), "truth" (d_S and its curve), "actual"
     landmarks: IntArray = field(
         default_factory=lambda: np.zeros(0, dtype=np.intp)
     )  # (L,) vertices marked on heads

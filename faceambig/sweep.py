@@ -12,7 +12,7 @@ there as well, the lower of each two fits is kept, and the sweep says where they
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -79,12 +79,12 @@ class Sweep:
             raise ValueError(f"distance: {distance:g} m is not above 0 and finite")
         return self.fits[int(np.argmin(np.abs(np.log(self.distances / distance))))]
 
-    def speed_mm_per_octave(self) -> Array:
+    def speed_mm_per_octave(self, *, progress: Callable[[int], object] | None = None) -> Array:
         """(D,) how fast the face changes at each distance: mm of mean surface movement per doubling of the distance.
 
         The derivative of d_S: mean over the model's evaluation region of the vertices' velocity along the path, its
         rigid motion taken out, times log 2. From the tangent of each fit, not from differences of the grid: it does
-        not depend on the grid. Computed when asked for, 2 to 3 ms a distance.
+        not depend on the grid. Computed when asked for, 2 to 3 ms a distance; `progress` as in `sweep_distance`.
 
         Raises
         ------
@@ -96,8 +96,13 @@ class Sweep:
                 f"method: {options.method!r}, weighting {options.weighting!r}: no optimum of E, its path has no "
                 "speed; sweep with method='joint'"
             )
-        chunks = range(0, len(self.fits), SPEEDS_AT_ONCE)
-        return np.concatenate([path_speeds(self.fits[k : k + SPEEDS_AT_ONCE]) for k in chunks])
+        speeds = []
+        for k in range(0, len(self.fits), SPEEDS_AT_ONCE):
+            fits = self.fits[k : k + SPEEDS_AT_ONCE]
+            speeds.append(path_speeds(fits))
+            if progress is not None:
+                progress(len(fits))
+        return np.concatenate(speeds)
 
     def interval(self, tolerance_percent: float = HUMAN_TOLERANCE_PERCENT) -> Interval:
         """The distances around the best one that the tolerance cannot tell apart, each end to 1 %.
@@ -144,6 +149,7 @@ def sweep_distance(
     method: Method = "joint",
     jacobian: Jacobian = "kaufman",
     als_rounds: int | None = 10,
+    progress: Callable[[int], object] | None = None,
 ) -> Sweep:
     """Fits at every distance, and orthographic.
 
@@ -154,6 +160,7 @@ def sweep_distance(
     modes, box, noise_percent, prior_weight, tolerance, max_steps, weighting, method, jacobian, als_rounds: as `fit`.
         Answers that are no optimum of E (weighting="algebraic", method="als") cannot be compared by their cost: no
         second direction is tried with them.
+    progress: called with the number of distances done since it was last called, such as the `update` of a tqdm bar.
 
     Raises
     ------
@@ -176,7 +183,7 @@ def sweep_distance(
         )
     task = prepare(model, observation, options)
     kappas = [0.0, *(1.0 / grid[::-1]).tolist()]
-    path = follow(task, kappas, _cold(task, 0.0))
+    path = follow(task, kappas, _cold(task, 0.0), progress)
     disagreed: list[float] = []
     if options.least_squares and _differ(task, path[-1], arrival := _cold(task, kappas[-1])):
         back = follow(task, kappas[::-1], arrival)[::-1]
@@ -186,11 +193,18 @@ def sweep_distance(
     return Sweep(grid, tuple(path[:0:-1]), path[0], np.array(disagreed[::-1]))
 
 
-def follow(task: Task, kappas: Sequence[float], first: Fit) -> list[Fit]:
+def follow(
+    task: Task,
+    kappas: Sequence[float],
+    first: Fit,
+    progress: Callable[[int], object] | None = None,
+) -> list[Fit]:
     """Fits at `kappas`, per metre, each from those before it; `first` is the one at kappas[0]."""
     path = [first]
     for kappa in kappas[1:]:
         path.append(solve_from(task, *_start(task, path[-3:], kappa)))
+        if progress is not None:
+            progress(1)
     return path
 
 

@@ -145,22 +145,28 @@ def strip() -> Scene:
 
 
 def like_stored(name: str, picture: np.ndarray) -> None:
-    """The picture (H, W, 3 or 4) against tests/golden/<name>.png. GOLDEN=write in the environment stores it anew.
+    """The picture (H, W, 3 or 4) against tests/golden/<name>.png. GOLDEN=write in the environment stores it anew."""
+    path = GOLDEN / f"{name}.png"
+    if os.environ.get("GOLDEN") == "write":
+        path.parent.mkdir(exist_ok=True)
+        bgr = np.ascontiguousarray(picture[..., 2::-1])
+        cv2.imwrite(str(path), bgr, [cv2.IMWRITE_PNG_COMPRESSION, 9])
+    like_file(path, picture)
+
+
+def like_file(path: Path, picture: np.ndarray) -> None:
+    """The picture (H, W, 3 or 4) against one that is stored.
 
     Tolerances: OSMesa and EGL give the same bytes here; what may differ is another CPU's rounding at outlines and
     another build of OpenCV's text. A head that moves by a pixel, or a changed light, is far outside.
     """
-    path = GOLDEN / f"{name}.png"
-    rgb = np.ascontiguousarray(picture[..., :3])
-    if os.environ.get("GOLDEN") == "write":
-        path.parent.mkdir(exist_ok=True)
-        cv2.imwrite(str(path), rgb[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 9])
+    rgb = picture[..., :3]
     stored = cv2.imread(str(path))
-    assert stored is not None, f"no stored picture {path.name}: GOLDEN=write makes it"
+    assert stored is not None, f"no stored picture {path.name}"
     stored = stored[..., ::-1]
     assert stored.shape == rgb.shape
     apart = np.abs(stored.astype(int) - rgb).max(axis=2)
-    assert apart.mean() < 0.5, f"{name}: {apart.mean():.2f} levels apart on average"
+    assert apart.mean() < 0.5, f"{path.name}: {apart.mean():.2f} levels apart on average"
     assert (apart > 24).mean() < 0.002, (
-        f"{name}: {100 * (apart > 24).mean():.2f} % of the pixels clearly differ"
+        f"{path.name}: {100 * (apart > 24).mean():.2f} % of the pixels clearly differ"
     )

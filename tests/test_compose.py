@@ -293,5 +293,7 @@ def test_a_photograph_of_unknown_size_cannot_be_drawn():
 
 
 def test_an_unknown_view_is_refused_with_those_there_are(subject, face, picture):
-    with pytest.raises(ValueError, match=r"view: 'below' is not one of front, .*top or camera"):
+    with pytest.raises(
+        ValueError, match=r"view: 'below' is not one of front, three_quarter, .*top, free or camera"
+    ):
         fc.compose(subject, face, picture, titles=TITLES, view="below")

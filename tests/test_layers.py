@@ -61,5 +61,7 @@ def test_command_line_starts_without_loading_anything_heavy() -> None:
     assert not loaded_by("import faceambig_app.cli") & (HEAVY | {"faceambig"})
 
 
-def test_state_is_parsed_without_numpy_and_viser() -> None:
-    assert not loaded_by("import faceambig_app.state") & (HEAVY | {"faceambig"})
+def test_state_link_and_history_do_without_numpy_and_viser() -> None:
+    modules = ("state", "forms", "link", "history")
+    statement = "import " + ", ".join(f"faceambig_app.{name}" for name in modules)
+    assert not loaded_by(statement) & (HEAVY | {"faceambig"})

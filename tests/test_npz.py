@@ -424,9 +424,7 @@ def test_any_bytes_inside_an_array_are_refused_or_make_a_finite_face(whole, data
     assert read is None or np.isfinite(read.vertices(np.ones(S))).all()
 
 
-@pytest.mark.parametrize(
-    "content", [b"", b"PK\x05\x06" + bytes(18), b"GIF89a", b"v 0 0 0\n"]
-)
+@pytest.mark.parametrize("content", [b"", b"PK\x05\x06" + bytes(18), b"GIF89a", b"v 0 0 0\n"])
 def test_other_files_are_not_models(path, content):
     path.write_bytes(content)
     with pytest.raises(

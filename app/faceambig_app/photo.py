@@ -5,19 +5,21 @@ Nothing is written before everything is computed, and then all files or none.
 
 from __future__ import annotations
 
-import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 import faceambig as fa
 from faceambig.arrays import Array
 from faceambig.io import LandmarkFile
 from faceambig.io.pictures import Picture, is_picture, picture_beside, read_picture
 
-from .pipeline import write_all
+from .pipeline import write_pairs
 
 NAMES = ("overlay.png", "face.obj", "face.ply", "face.glb", "fit.json")
 HINTED = (0.2, 50.0)  # metres: distances that a hint may name
@@ -169,8 +171,8 @@ def hint_words(hint: Mapping[str, float]) -> str:
     )
 
 
-def folder(out: str) -> Path:
-    """The folder to write to; ValueError if it cannot be one. It is made only when there is something to write."""
+def folder(out: str, names: Iterable[str] = NAMES) -> Path:
+    """The folder to write `names` to; ValueError if it cannot be one. It is made when there is something to write."""
     path = Path(out)
     if path.exists() and not path.is_dir():
         raise ValueError(f"out: {out!r} is a file, not a folder")
@@ -178,7 +180,7 @@ def folder(out: str) -> Path:
         raise ValueError(f"out: there is no folder {str(path.parent)!r}")
     if not os.access(path if path.exists() else path.parent, os.W_OK | os.X_OK):
         raise ValueError(f"out: {out!r}: no permission to write there")
-    for name in NAMES:
+    for name in names:
         if (path / name).is_dir():
             raise ValueError(
                 f"out: {str(path / name)!r} is a folder, and a file of that name is to be written"
@@ -192,6 +194,7 @@ def contents(
     """The files of a fit by name: picture, meshes, numbers. `lines` stand under the picture and in the meshes."""
     from faceambig.arrays import vertex_normals
     from faceambig.compose import photo_of_fit
+    from faceambig.io.fits import encode_fit
     from faceambig.io.meshes import Mesh, encode_glb, encode_obj, encode_ply
     from faceambig.render.fitted import draw_fitted
     from faceambig.render.overlay import encode_png
@@ -213,23 +216,48 @@ def contents(
                 encode_obj(mesh),
                 encode_ply(mesh),
                 encode_glb(mesh),
-                (json.dumps(whole, indent=1) + "\n").encode(),
+                encode_fit(fit, whole),
             ),
             strict=True,
         )
     )
 
 
-def write_folder(path: Path, files: Mapping[str, bytes]) -> None:
-    """All files into the folder `path`, or none and no folder; ValueError says why not."""
+def face_meshes(
+    model: fa.FaceModel, name: str, alpha: Array, notes: Sequence[str], kinds: Sequence[str]
+) -> Iterator[tuple[str, bytes]]:
+    """Files of one face in the model's colours, or in clay: name.obj, .ply, .glb, those of `kinds`."""
+    from faceambig.arrays import vertex_normals
+    from faceambig.compose import CLAY
+    from faceambig.io.meshes import Mesh, encode_glb, encode_obj, encode_ply
+
+    encode = {"obj": encode_obj, "ply": encode_ply, "glb": encode_glb}
+    vertices, colours = model.vertices(alpha), model.colours
+    if colours is None:
+        colours = np.tile(np.array(CLAY, dtype=np.uint8), (model.n_vertices, 1))
+    about = f"model: {model.name}, {model.source} ({model.licence})"
+    mesh = Mesh(
+        vertices, model.faces, colours, vertex_normals(vertices, model.faces), (*notes, about)
+    )
+    for kind in kinds:
+        yield f"{name}.{kind}", encode[kind](mesh)
+
+
+def write_folder(
+    path: Path, files: Iterable[tuple[str, bytes]], beside: Mapping[Path, bytes] | None = None
+) -> None:
+    """All files, by name, into the folder `path`, and those `beside` it; or none and no folder: ValueError says why.
+
+    They are taken one after the other: a thousand meshes need not be in memory together.
+    """
     made = not path.exists()
     try:
         path.mkdir(exist_ok=True)
     except OSError as error:
         raise ValueError(f"out: cannot make {str(path)!r}: {error.strerror}") from error
     try:
-        write_all({path / name: data for name, data in files.items()})
-    except ValueError:
+        write_pairs(chain((beside or {}).items(), ((path / name, data) for name, data in files)))
+    except BaseException:  # an interruption too
         if made and not any(path.iterdir()):
             path.rmdir()
         raise

@@ -7,7 +7,7 @@ does not depend on the way the slider took.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -24,10 +24,15 @@ from faceambig.model import FaceModel, Subject
 from faceambig.observation import portrait_camera
 from faceambig.scene import Curves, Photo, Scene
 
-from .state import DEFAULT, FIELDS, Bend, Fitting, Look, Target, ViewState
+from .forms import to_json
+from .state import DEFAULT, Bend, Fitting, Look, Target, ViewState
 from .text import centimetres, distance_text, percent_number, say
 
 ROW_DISTANCES = (0.3, 0.6, 1.2, 2.4)  # metres, of the strip of faces
+# What is composed today of what a state can ask for
+SHOWS = ("both", "row")
+SURFACES = ("skin", "difference")
+VIEWS = ("front", "three_quarter", "side", "top", "camera")
 PHOTO_FULL, PHOTO_DRAFT = 560, 200  # pixels wide, of the page's photograph
 
 
@@ -59,6 +64,10 @@ def model(name: str) -> FaceModel:
 @lru_cache(maxsize=256)
 def photograph(target: Target) -> Photograph:
     """The synthetic photograph of a target."""
+    if isinstance(target.subject, str):
+        raise ValueError("subject: photo: there is no photograph here, only the synthetic people")
+    if target.data != "points":
+        raise ValueError(f"data: {target.data} is not fitted here, only points")
     subject = model(target.model).subject(target.subject)
     pose = {
         "scheme": target.scheme,
@@ -95,28 +104,36 @@ def _modes(fitting: Fitting) -> int | None:
 
 
 @lru_cache(maxsize=256)
-def bending(target: Target, fitting: Fitting) -> FlexibilityModes:
-    """The most flexible mode of a fit."""
+def bending(target: Target, fitting: Fitting, flex_at: str, count: int) -> FlexibilityModes:
+    """The `count` most flexible modes of a fit."""
     fit = fitted(target, fitting)
-    return fa.flexibility_modes(fit.model, fit, count=1)
+    # The fast solver's landmarks are those of the picture; the paper's, of the algebraic DLT
+    linearisation = "algebraic" if flex_at == "dlt" else "reprojection"
+    return fa.flexibility_modes(fit.model, fit, count=count, linearisation=linearisation)
 
 
 @lru_cache(maxsize=256)
 def face(target: Target, fitting: Fitting, bend: Bend) -> Face:
-    """The fitted face, bent, measured against the true one."""
+    """The fitted face, bent, measured against the true one; its words are of the mode bent most."""
+    if bend.draw is not None:
+        raise ValueError(f"draw: {bend.draw}: faces drawn from the posterior are not drawn here")
     fit = fitted(target, fitting)
     subject = photograph(target).subject
-    if bend.flex == 0:
+    if not bend.flex:
         return measure(subject, fit)
-    modes = bending(target, fitting)
+    last = max(mode for mode, _ in bend.flex)
+    if last > len(fit.alpha):
+        raise ValueError(f"flex: mode {last} of a fit with {len(fit.alpha)} modes")
+    modes = bending(target, fitting, bend.flex_at, last)
+    most, most_mm = max(bend.flex, key=lambda pair: abs(pair[1]))
     return measure(
         subject,
         fit,
-        bend.flex * modes.directions[0],
+        np.sum([mm * modes.directions[mode - 1] for mode, mm in bend.flex], axis=0),
         # A fit that is beyond the limit by itself is not blamed on the bend that leads back
         limit=max(plausible_limit(len(fit.alpha)), float(np.linalg.norm(fit.alpha))),
-        flex_words=modes.words[0],
-        flex_mm=bend.flex,
+        flex_words=modes.words[most - 1],
+        flex_mm=most_mm,
     )
 
 
@@ -137,6 +154,7 @@ def curve(target: Target, fitting: Fitting) -> Curves:
 
 def frame(state: ViewState, *, with_curves: bool = True) -> Frame:
     """Everything a browser shows of a state. with_curves=False leaves the plots out: they cost a sweep a target."""
+    _drawn(state.look)
     if state.show == "row":
         return Frame(state, row(state), "", (0.0, 0.0))
     target, fitting = state.target, state.fitting
@@ -147,8 +165,15 @@ def frame(state: ViewState, *, with_curves: bool = True) -> Frame:
     )
     if not with_curves:
         return Frame(state, scene, "", (0.0, 0.0))
-    modes = bending(target, fitting)
+    modes = bending(target, fitting, state.flex_at, 1)
     return Frame(state, scene, modes.words[0], modes.reach(0))
+
+
+def _drawn(look: Look) -> None:
+    """ValueError for a look that no scene is composed of."""
+    for name, ours in (("show", SHOWS), ("surface", SURFACES), ("view", VIEWS)):
+        if (value := getattr(look, name)) not in ours:
+            raise ValueError(f"{name}: {value} is not drawn here, only {', '.join(ours)}")
 
 
 def curve_key(state: ViewState) -> tuple[Target, Fitting]:
@@ -221,24 +246,9 @@ def snapshot(
     if path is not None:
         write(
             Path(path),
-            encode_png(picture, {"Software": "faceambig", "ViewState": state_json(state)}),
+            encode_png(picture, {"Software": "faceambig", "ViewState": to_json(state)}),
         )
     return picture
-
-
-def state_json(state: ViewState) -> str:
-    """The state as JSON, defaults left out; equal states give the same text."""
-    import msgspec
-
-    # Not encode(state): that leaves a float out only if it is the default's own object, and 10 is not 10.0
-    values = {name: field.kind(getattr(state, name)) for name, field in FIELDS.items()}
-    values |= {"v": state.v, "model": state.model}
-    written = {
-        name: values[name]
-        for name in state.__struct_fields__
-        if values[name] != getattr(DEFAULT, name)
-    }
-    return msgspec.json.encode(written).decode()
 
 
 def writable(path: Path) -> None:
@@ -260,10 +270,15 @@ def write_all(files: Mapping[Path, bytes]) -> None:
 
     ValueError says why not; of a full disk nothing is left.
     """
+    write_pairs(files.items())
+
+
+def write_pairs(files: Iterable[tuple[Path, bytes]]) -> None:
+    """As `write_all`; the files are taken one after the other, so that they need not be in memory together."""
     path = None
     try:
         with ExitStack() as stack:
-            for path, data in files.items():
+            for path, data in files:
                 stack.enter_context(replacing(path)).write_bytes(data)
     except OSError as error:
         raise ValueError(f"out: cannot write {str(path)!r}: {error.strerror}") from error

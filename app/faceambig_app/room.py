@@ -17,7 +17,7 @@ import time
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from .state import ViewState, changed
+from .state import ViewState
 
 log = logging.getLogger("faceambig")
 
@@ -47,12 +47,8 @@ class Room:
         self._changed_at = 0.0  # monotonic seconds
         self._drawn: tuple[float, bool] | None = None  # the change drawn last; whether as a draft
 
-    def hear(self, values: dict[str, Any]) -> None:
-        """Take a change of some fields, already in range. On the event loop only: one writer, in message order."""
-        self.go(changed(self.state, **values))
-
     def go(self, state: ViewState) -> None:
-        """Make `state` the newest and ask to be served."""
+        """Make `state` the newest and ask to be served. On the event loop only: one writer, in message order."""
         if state == self.state:
             return
         self.state = state

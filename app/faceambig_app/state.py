@@ -1,68 +1,30 @@
-"""ViewState: everything a person can set, as one frozen value, and the table of its fields.
-
-One row of FIELDS drives the slider, the number box, the command line flag, the key of the address, the key of the JSON,
-the range and the hint of a setting. Metres and degrees inside; centimetres only on labels.
+"""ViewState: everything a person can set, as one frozen value. The table of its fields is in fields.py.
 
 The state falls into four parts, each the key of one cached step of the pipeline: Target -> Fitting -> Bend -> Look.
+States that mean the same are equal: every value is brought into its canonical form when a state is made.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import msgspec
 
+from .fields import FIELDS, PINS, Field, canonical
 
-@dataclass(frozen=True, slots=True)
-class Field:
-    """One setting: where it may lie and what it is called."""
+__all__ = [
+    "DEFAULT", "FIELDS", "VERSION", "Bend", "Field", "Fitting", "Look", "Target", "ViewState",
+    "changed", "short",
+]  # fmt: skip
 
-    name: str  # ViewState field, URL and JSON key, Python keyword
-    kind: type  # float, int or str
-    low: float = -math.inf
-    high: float = math.inf
-    step: float = 1.0  # of the widget, in the widget's unit
-    unit: str = ""  # "m", "deg", "mm", "%"
-    choices: tuple[str, ...] = ()
-
-    @property
-    def flag(self) -> str:
-        """Command line flag."""
-        return "--" + self.name.replace("_", "-")
-
-
-FIELDS: Mapping[str, Field] = {
-    field.name: field
-    for field in (
-        Field("subject", int, 1, 10),
-        Field("actual", float, 0.2, 5.0, unit="m"),
-        Field("distance", float, 0.2, 3.0, unit="m"),
-        Field("camera", str, choices=("perspective", "orthographic")),
-        Field("yaw", float, -60, 60, unit="deg"),
-        Field("pitch", float, -30, 30, unit="deg"),
-        Field("roll", float, -45, 45, unit="deg"),
-        Field("scheme", str, choices=("ibug68", "farkas")),
-        Field("noise", float, 0, 5, step=0.5, unit="%"),
-        Field("seed", int, 0, 9999),
-        Field("modes", int, 10, 100),
-        Field("prior", float, 0.01, 5, unit="%"),
-        Field("box", float, 1, 4, step=0.5),
-        Field("flex", float, -10, 10, step=0.5, unit="mm"),
-        Field("show", str, choices=("both", "row")),
-        Field("surface", str, choices=("skin", "difference")),
-        Field("view", str, choices=("front", "three_quarter", "side", "top", "camera")),
-    )
-}
+VERSION = 1  # of the format of links and files
 
 
 class Target(NamedTuple):
     """What was photographed, and how: the key of an observation."""
 
     model: str
-    subject: int
+    subject: int | str  # counted from 1, or "photo"
     actual: float
     yaw: float
     pitch: float
@@ -70,6 +32,7 @@ class Target(NamedTuple):
     scheme: str
     noise: float
     seed: int
+    data: str
 
 
 class Fitting(NamedTuple):
@@ -82,9 +45,11 @@ class Fitting(NamedTuple):
 
 
 class Bend(NamedTuple):
-    """How the fitted face is bent along its flexibility modes: mm of the first."""
+    """How the fitted face is bent: (mode, mm) along flexibility modes; or which posterior face stands for it."""
 
-    flex: float
+    flex: tuple[tuple[int, float], ...]
+    flex_at: str
+    draw: int | None
 
 
 class Look(NamedTuple):
@@ -93,6 +58,15 @@ class Look(NamedTuple):
     show: str
     surface: str
     view: str
+    orbit: tuple[float, float] | None
+    zoom: float
+    overlays: tuple[str, ...]
+    error_scale: int
+    fade: float
+    hide: tuple[str, ...]
+
+
+_P = TypeVar("_P", Target, Bend, Look)
 
 
 class ViewState(
@@ -100,9 +74,9 @@ class ViewState(
 ):
     """Everything a person can set. `prior` is the noise the fit assumes, `noise` what observe adds."""
 
-    v: int = 1
+    v: int = VERSION
     model: str = "embedded"
-    subject: int = (
+    subject: int | str = (
         2  # of the ten, the face that shows the effect best: d_S 1.0 mm at 30 cm, 4.1 mm at 120 cm
     )
     actual: float = 0.3  # metres, where the photo was taken from
@@ -112,98 +86,95 @@ class ViewState(
     pitch: float = 0.0
     roll: float = 0.0
     scheme: str = "ibug68"
+    data: str = "points"
     noise: float = 0.0  # % of the eye distance, added to the points
     seed: int = 0
     modes: int = 70
     prior: float = 1.0  # % of the eye distance, noise the fit assumes
     box: float = 2.0  # standard deviations
-    flex: float = 0.0  # mm along the first flexibility mode
+    flex: tuple[tuple[int, float], ...] = ()  # (mode from 1, mm of mean surface change)
+    flex_at: str = "reprojection"
+    draw: int | None = None
     show: str = "both"
     surface: str = "skin"
     view: str = "three_quarter"
+    orbit: tuple[float, float] | None = None  # degrees: azimuth, elevation
+    zoom: float = 1.0
+    overlays: tuple[str, ...] = ("points", "ghost", "scale")
+    error_scale: int = 1
+    fade: float = 0.5
+    hide: tuple[str, ...] = ()
+    pins: tuple[ViewState, ...] = ()  # each as short() makes it, of this state's model
+    theme: str = "auto"
+    text: float = 1.0
 
     def __post_init__(self) -> None:
-        if self.v != 1:
-            raise ValueError(f"v: {self.v!r} is a newer format than this program reads (1)")
-        if not self.model:
-            raise ValueError("model: '' is not a name or a path")
-        for field in FIELDS.values():
-            check(field, getattr(self, field.name))
+        if isinstance(self.v, bool) or self.v != VERSION:
+            raise ValueError(
+                f"v: {self.v!r:.60} is not the format that this program reads ({VERSION})"
+            )
+        for name, field in FIELDS.items():
+            value = canonical(field, getattr(self, name))
+            if field.kind == "pins" and value:
+                value = _pinned(value, self.model)
+            # The one place where a state is written to: it is being made
+            msgspec.structs.force_setattr(self, name, value)
+        if self.view == "free" and self.orbit is None:
+            raise ValueError("view: free needs an orbit, the viewer's azimuth and elevation")
 
     @property
     def target(self) -> Target:
         """The part that decides the observation."""
-        return Target(
-            self.model,
-            self.subject,
-            self.actual,
-            self.yaw,
-            self.pitch,
-            self.roll,
-            self.scheme,
-            self.noise,
-            self.seed,
-        )
+        return self._part(Target)
 
     @property
     def fitting(self) -> Fitting:
         """The part that decides the fit of an observation."""
-        return Fitting(
-            None if self.camera == "orthographic" else self.distance,
-            self.modes,
-            self.prior,
-            self.box,
-        )
+        distance = None if self.camera == "orthographic" else self.distance
+        return Fitting(distance, self.modes, self.prior, self.box)
 
     @property
     def bend(self) -> Bend:
         """The part that bends a fitted face."""
-        return Bend(self.flex)
+        return self._part(Bend)
 
     @property
     def look(self) -> Look:
         """The part that only decides what is drawn."""
-        return Look(self.show, self.surface, self.view)
+        return self._part(Look)
+
+    def _part(self, part: type[_P]) -> _P:
+        return part(*(getattr(self, name) for name in part._fields))
 
 
-def check(field: Field, value: Any) -> None:
-    """ValueError, naming field, value and range, unless `value` may stand in `field`."""
-    if field.kind is str:
-        if value not in field.choices:
-            raise ValueError(f"{field.name}: {value!r} is not {' or '.join(field.choices)}")
-        return
-    if not isinstance(value, field.kind | int) or isinstance(
-        value, bool
-    ):  # every int is a float, not the other way
-        raise ValueError(
-            f"{field.name}: {value!r} is not a {'whole number' if field.kind is int else 'number'}"
-        )
-    if not field.low <= value <= field.high:  # False for NaN too
-        unit = f" {field.unit}" if field.unit else ""
-        try:
-            shown = f"{value:g}"
-        except OverflowError:  # a whole number beyond every float
-            shown = "a number of that many digits"
-        raise ValueError(
-            f"{field.name}: {shown} is not within {field.low:g} to {field.high:g}{unit}"
-        )
+_OF_A_FACE = tuple(n for n, f in FIELDS.items() if f.part in ("target", "fitting", "bend"))
+_NOT_OF_A_FACE = tuple(name for name in FIELDS if name not in _OF_A_FACE)
+
+
+def short(state: ViewState) -> ViewState:
+    """The state of a face alone, as it is pinned: target, fitting and bend; the look and the pins as by default."""
+    return ViewState(**{name: getattr(state, name) for name in _OF_A_FACE})
+
+
+def _pinned(pins: tuple[Any, ...], model: str) -> tuple[ViewState, ...]:
+    """Pins in their short form; all are of one model, as faces of different meshes cannot be compared."""
+    if len(pins) > PINS:
+        raise ValueError(f"pins: {len(pins)} of them; give at most {PINS}")
+    for pin in pins:
+        if not isinstance(pin, ViewState):
+            raise ValueError(f"pins: {pin!r:.60} is not a ViewState")
+    return tuple(pin if _is_short(pin, model) else changed(short(pin), model=model) for pin in pins)
+
+
+def _is_short(pin: ViewState, model: str) -> bool:
+    return pin.model == model and all(
+        getattr(pin, name) == getattr(DEFAULT, name) for name in _NOT_OF_A_FACE
+    )
 
 
 def changed(state: ViewState, **values: Any) -> ViewState:
     """`state` with some fields changed; ValueError if a value is out of range."""
     return msgspec.structs.replace(state, **values)
-
-
-def parse(kind_of: Field, text: str) -> Any:
-    """The value of a field written as text (address, flag); ValueError if it is none."""
-    if kind_of.kind is str:
-        return text.replace("-", "_")  # three-quarter, as people write it
-    try:
-        return kind_of.kind(text)
-    except ValueError as error:
-        raise ValueError(
-            f"{kind_of.name}: {text!r:.60} is not a {'whole ' if kind_of.kind is int else ''}number"
-        ) from error
 
 
 DEFAULT = ViewState()

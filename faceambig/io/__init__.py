@@ -1,4 +1,4 @@
-"""Readers: a file becomes a FaceModel or landmarks. Each is chosen by what the file holds, not by its name alone."""
+"""Readers: a file becomes a FaceModel, landmarks or a fit, chosen by what it holds, not by its name alone."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from ..model import FaceModel
 from .basel import read_basel
 from .eos import is_eos, read_eos
 from .files import asset_path
+from .fits import load_fit, save_fit
 from .flame import is_flame, read_flame
 from .gnm import is_gnm, read_gnm
 from .ict import is_ict, read_ict
@@ -30,8 +31,10 @@ __all__ = [
     "LandmarkFile",
     "asset_path",
     "eye_distances",
+    "load_fit",
     "load_landmarks",
     "load_model",
+    "save_fit",
     "save_landmarks",
     "save_model",
 ]

@@ -28,13 +28,11 @@ def asset_path(name: str) -> Path:
     return (installed if installed.is_dir() else package.parent / "assets") / name
 
 
-def text_of(path: Path) -> str:
-    """A small text file; AssetError if it is none."""
+def text_of(path: Path, most: int = MAX_TEXT_BYTES, kind: str = "a landmark file") -> str:
+    """A text file of at most `most` bytes; AssetError if it is none."""
     try:
-        if path.stat().st_size > MAX_TEXT_BYTES:
-            raise AssetError(
-                f"{path.name}: {path.stat().st_size} bytes, a landmark file has at most {MAX_TEXT_BYTES}"
-            )
+        if path.stat().st_size > most:
+            raise AssetError(f"{path.name}: {path.stat().st_size} bytes, {kind} has at most {most}")
         return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         raise AssetError(f"{path.name}: not a text file") from error

@@ -4,12 +4,8 @@ from __future__ import annotations
 
 import argparse
 import json
-from typing import TYPE_CHECKING
 
-from .shared import GOOD, version
-
-if TYPE_CHECKING:
-    from pathlib import Path
+from .shared import GOOD, target, version
 
 
 def add(command: argparse.ArgumentParser) -> None:
@@ -82,21 +78,3 @@ def run(options: argparse.Namespace) -> int:
     if files:
         print(f"written: {', '.join(files)}")
     return GOOD
-
-
-def target(name: str, value: str | None, suffix: str, photograph: Path) -> Path | None:
-    """The path to write to, if one is asked for; ValueError if that cannot be, before any work."""
-    from pathlib import Path
-
-    if value is None:
-        return None
-    path = Path(value)
-    if path.suffix.lower() != suffix:
-        raise ValueError(f"{name}: {value!r} does not end in {suffix}")
-    if not path.parent.is_dir():
-        raise ValueError(f"{name}: there is no folder {str(path.parent)!r}")
-    if path.is_dir():
-        raise ValueError(f"{name}: {value!r} is a folder, not a file")
-    if path.exists() and photograph.exists() and path.samefile(photograph):
-        raise ValueError(f"{name}: {value!r} is the photograph itself")
-    return path

@@ -1,63 +1,105 @@
-"""What several commands share: statuses, flags of a fit, records for programs, words for people."""
+"""What several commands share: statuses, records for programs, words for people, tables, files to write."""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import faceambig as fa
 
 GOOD, NOT_CONVERGED, BAD_INPUT = 0, 1, 2
 
 
-def add_points(command: argparse.ArgumentParser) -> None:
-    command.add_argument(
-        "points",
-        metavar="FILE",
-        help="landmarks of the photograph: .pts, CSV with x and y, or JSON; 68 or 51 points of iBUG, "
-        "468 or 478 of MediaPipe, or points with names",
-    )
-    add_options(command)
-
-
-def add_options(command: argparse.ArgumentParser) -> None:
-    command.add_argument(
-        "--model", default="embedded", help="model name or path (default embedded)"
-    )
-    command.add_argument(
-        "--image-size",
-        metavar="WxH",
-        help="size of the picture in pixels (default: of the picture of the same name beside the points)",
-    )
-    command.add_argument(
-        "--modes",
-        type=int,
-        help="shape modes used (default: the strongest 70, or all of a model with fewer)",
-    )
-    command.add_argument(
-        "--box", type=float, default=2.0, help="largest shape coefficient, sd (default 2)"
-    )
-    command.add_argument(
-        "--prior",
-        type=float,
-        default=1.0,
-        help="landmark noise assumed, %% of the eye distance (default 1)",
-    )
+def add_outputs(command: argparse.ArgumentParser, table: str, picture: str) -> None:
+    """--json, and files for a table and a picture; what they hold is said in the help."""
     command.add_argument("--json", action="store_true", help="print JSON for programs")
+    command.add_argument("--csv", metavar="FILE.csv", help=f"write {table} as a table there")
+    command.add_argument("--plot", metavar="FILE.png", help=f"draw {picture} there")
 
 
-def observation_of(
-    options: argparse.Namespace, model: fa.FaceModel
-) -> tuple[fa.Observation, dict[str, Any]]:
-    """The points of a file, and what was assumed about their picture."""
-    import faceambig as fa
+def outputs_of(options: argparse.Namespace) -> tuple[Path | None, Path | None]:
+    """Where table and picture are to be written; ValueError if that cannot be, before any work."""
+    from pathlib import Path
 
-    size = image_size(options.image_size)
-    read = fa.load_landmarks(options.points, image_size=size, model=model)
-    observation = fa.Observation(read.points, read.scheme, image_size=read.image_size)
-    words = f"{read.words}; {read.scheme}, {read.unit}"
-    return observation, notes_of(observation, read.image_size_from, words)
+    source = None if options.file is None else Path(options.file)
+    csv = target("--csv", options.csv, ".csv", source)
+    return csv, target("--plot", options.plot, ".png", source)
+
+
+def target(name: str, value: str | None, suffix: str, source: Path | None) -> Path | None:
+    """The path to write to, if one is asked for; ValueError if that cannot be, or if it is `source` itself."""
+    from pathlib import Path
+
+    if value is None:
+        return None
+    path = Path(value)
+    if path.suffix.lower() != suffix:
+        raise ValueError(f"{name}: {value!r} does not end in {suffix}")
+    if not path.parent.is_dir():
+        raise ValueError(f"{name}: there is no folder {str(path.parent)!r}")
+    if path.is_dir():
+        raise ValueError(f"{name}: {value!r} is a folder, not a file")
+    if source is not None and path.exists() and source.exists() and path.samefile(source):
+        what = "photograph" if suffix in (".json", ".png") else "input"
+        raise ValueError(f"{name}: {value!r} is the {what} itself")
+    return path
+
+
+def table_csv(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> bytes:
+    """A CSV file: a header, rows of numbers with all their digits."""
+    import csv
+    import io
+
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows(rows)
+    return text.getvalue().encode()
+
+
+def written(
+    files: Mapping[Path, bytes],
+    folder: Path | None = None,
+    inside: Iterable[tuple[str, bytes]] = (),
+) -> list[str]:
+    """Write all files, and those `inside` a folder by name, or none; what was written, in order."""
+    from ..photo import write_folder
+    from ..pipeline import write_all
+
+    done = [str(path) for path in files]
+    if folder is None:
+        write_all(files)
+        return done
+
+    def named() -> Iterable[tuple[str, bytes]]:
+        for name, data in inside:
+            done.append(str(folder / name))
+            yield name, data
+
+    write_folder(folder, named(), files)
+    return done
+
+
+def written_lines(done: Sequence[str]) -> list[str]:
+    """What was written, in words."""
+    if not done:
+        return []
+    if len(done) <= 6:
+        return [f"written: {', '.join(done)}"]
+    return [f"written: {len(done)} files, {done[0]} to {done[-1]}"]
+
+
+def say_or_print(
+    options: argparse.Namespace, record: Mapping[str, Any], lines: Iterable[str]
+) -> None:
+    """The record for a program, or the lines for a person."""
+    import json
+
+    print(json.dumps(record, allow_nan=False) if options.json else "\n".join(lines))
 
 
 def notes_of(observation: fa.Observation, image_size_from: str, landmarks: str) -> dict[str, Any]:
@@ -71,14 +113,26 @@ def notes_of(observation: fa.Observation, image_size_from: str, landmarks: str) 
     }
 
 
-def image_size(text: str | None) -> tuple[int, int] | None:
-    """(width, height) of "640x480"."""
-    if text is None:
-        return None
-    width, cross, height = text.lower().partition("x")
-    if not (cross and width.isdecimal() and height.isdecimal() and int(width) and int(height)):
-        raise ValueError(f"--image-size: {text!r} is not like 640x480")
-    return int(width), int(height)
+def note_lines(fit: fa.Fit, notes: Mapping[str, Any]) -> list[str]:
+    """The same in words, with the unit of d_L."""
+    return [
+        f"interocular distance: {fit.interocular_px:.1f} px, {fit.interocular_meaning}",
+        f"principal point: {notes['principal_point']}; picture size: {notes['image_size_from']}",
+        f"landmarks: {notes['landmarks']}",
+    ]
+
+
+def fit_line(fit: fa.Fit) -> str:
+    """How a fit ended, in one line."""
+    return (
+        f"{fit.status}: camera at {place(fit.distance)}, landmark error d_L {fit.d_l_percent:.2f} % "
+        "of the interocular distance"
+    )
+
+
+def place(metres: float | None) -> str:
+    """A distance in words."""
+    return "far away (orthographic)" if metres is None else f"{100 * metres:.3g} cm"
 
 
 def fit_record(fit: fa.Fit) -> dict[str, Any]:

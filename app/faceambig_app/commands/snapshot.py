@@ -4,28 +4,9 @@ from __future__ import annotations
 
 import argparse
 
-from ..state import DEFAULT, FIELDS, ViewState, parse
+from ..forms import LONGEST, from_json, text_of, value_of
+from ..state import DEFAULT, FIELDS, Field, ViewState, changed
 from .shared import GOOD
-
-HELP = {
-    "subject": "synthetic person, counted from 1",
-    "actual": "where the photo was taken from, metres",
-    "distance": "distance the fit assumes, metres",
-    "camera": "camera of the fit",
-    "yaw": "turn of the head in the photo, degrees",
-    "pitch": "nod of the head in the photo, degrees",
-    "roll": "tilt of the head in the photo, degrees",
-    "scheme": "landmarks used",
-    "noise": "noise added to the points, %% of the eye distance",
-    "seed": "of the noise",
-    "modes": "shape modes of the fit",
-    "prior": "landmark noise the fit assumes, %% of the eye distance",
-    "box": "largest shape coefficient, standard deviations",
-    "flex": "millimetres along the first flexibility mode",
-    "show": "two heads, or the row of fits at 30 60 120 240 cm",
-    "surface": "colours of the fitted face",
-    "view": "where the viewer stands",
-}
 
 
 def add(command: argparse.ArgumentParser) -> None:
@@ -35,22 +16,29 @@ def add(command: argparse.ArgumentParser) -> None:
     )
     command.add_argument("--width", type=int, metavar="PX", help="width of the picture")
     command.add_argument("--height", type=int, metavar="PX", help="height of the picture")
+    add_state(command)
+
+
+def add_state(command: argparse.ArgumentParser) -> None:
+    """The flags of a state: the model, and the rows of the field table."""
     command.add_argument(
-        "--model", default=DEFAULT.model, help="model name or path (default embedded)"
+        "--state", metavar="FILE.json", help="a state, as saved by the page; flags change it"
     )
     for field in FIELDS.values():
-        unit = (
-            f" [{field.low:g} to {field.high:g}]"
-            if not field.choices
-            else f" [{', '.join(field.choices)}]"
-        )
-        default = getattr(DEFAULT, field.name)
         command.add_argument(
-            field.flag,
-            dest=field.name,
-            metavar=field.name.upper(),
-            help=f"{HELP[field.name]}{unit} (default {default})",
+            field.flag, dest=field.name, metavar=field.name.upper(), help=help_of(field)
         )
+
+
+def help_of(field: Field, also: str = "") -> str:
+    """What a flag sets, its range or choices, its default."""
+    within = f"{field.low:g} to {field.high:g}" if field.high < float("inf") else ""
+    told = " ".join(filter(None, (within, field.unit))) or ", ".join(map(str, field.choices))
+    default = text_of(field, getattr(DEFAULT, field.name))
+    ranged = f" [{told}]" if told else ""
+    return f"{field.help}{also}{ranged} (default {default})".replace(
+        "%", "%%"
+    )  # argparse fills in %
 
 
 def run(options: argparse.Namespace) -> int:
@@ -69,10 +57,23 @@ def run(options: argparse.Namespace) -> int:
 
 
 def state_of(options: argparse.Namespace) -> ViewState:
-    """The state of the flags given."""
+    """The state of the file and the flags given; a flag counts before the file."""
     given = {
-        name: parse(field, getattr(options, name))
+        name: value_of(field, getattr(options, name))
         for name, field in FIELDS.items()
         if getattr(options, name) is not None
     }
-    return ViewState(model=options.model, **given)
+    return changed(DEFAULT if options.state is None else _saved(options.state), **given)
+
+
+def _saved(name: str) -> ViewState:
+    """The state in a file of JSON."""
+    from pathlib import Path
+
+    path = Path(name)
+    with path.open("rb") as file:
+        content = file.read(LONGEST + 1)  # not more than tells that it is too long
+    try:
+        return from_json(content)
+    except ValueError as error:
+        raise ValueError(f"{path.name}: {error}") from error

@@ -2,8 +2,8 @@
 
 viser is pinned: the hooks name private parts, and `start` refuses any other version. They act on servers made by
 `start` alone; which server a piece of code serves is found in the context that each connection runs in. In the page
-`assets/page.js` stands before viser's script; its data come through hidden elements (`data_html`) and, for colours,
-a hidden cloud of points (`add_colours`).
+our script, assets/page/, stands before viser's; its data come through hidden elements (`data_html`) and, for colours,
+a hidden cloud of points (`add_colours`), and it answers through one hidden text control (`add_reports`).
 """
 
 from __future__ import annotations
@@ -12,19 +12,18 @@ from collections.abc import Collection, Sequence
 
 import viser
 
-from faceambig.io import asset_path
-
 from .data import add_colours, data_html
 from .door import Door, Hooks, ServeError, log_line
 from .hooks import install, opened
 from .messages import MAX_BAD, MAX_MESSAGE
-from .page import PATCHES, make_page
+from .page import PATCHES, make_page, our_script
+from .reports import MAX_REPORT, add_reports
 from .requests import listen
 from .values import TYPING, restate
 
 __all__ = [
-    "MAX_BAD", "MAX_MESSAGE", "PATCHES", "TYPING", "Hooks", "ServeError", "add_colours", "data_html", "log_line",
-    "restate", "start",
+    "MAX_BAD", "MAX_MESSAGE", "MAX_REPORT", "PATCHES", "TYPING", "Hooks", "ServeError", "add_colours", "add_reports",
+    "data_html", "log_line", "restate", "start",
 ]  # fmt: skip
 
 
@@ -45,7 +44,7 @@ def start(
     """
     install()
     page = make_page(
-        script if script is not None else asset_path("page.js").read_text(encoding="utf-8"),
+        our_script() if script is None else script,
         title,
         PATCHES if patches is None else patches,
     )

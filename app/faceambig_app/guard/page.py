@@ -16,7 +16,14 @@ import numpy as np
 import viser
 import zstandard
 
+from faceambig.io import asset_path
+
+from ..text import words
+from .data import data_meta
 from .door import VISER, ServeError
+
+# assets/page/*.js, joined in this order
+PARTS = ("channel", "look", "keys", "scene", "colours", "names", "copy", "photo", "status")
 
 # viser sends the changes of a panel's controls through one sender, which every 50 ms keeps the newest message: a value
 # set less than 50 ms before another control changes never arrives. Ours keeps the newest of each control, in order,
@@ -40,7 +47,10 @@ _OUR_SENDER = (
 # The canvas is told in device pixels, three to a pixel of the page on a phone; the page's own decide the layout.
 _CANVAS = "image_height:o.height,image_width:o.width,fov:"
 _OUR_CANVAS = "image_height:o.clientHeight,image_width:o.clientWidth,fov:"
-PATCHES = ((_SENDER, _OUR_SENDER), (_CANVAS, _OUR_CANVAS))
+# Dark, where the page around viser's asks for it, stays for ever; our script is asked at every change.
+_DARK = "r=n.useGui(e=>e.theme.dark_mode),i=t||r,"
+_OUR_DARK = "r=n.useGui(e=>window.__faceambig?.dark(e.theme.dark_mode)??e.theme.dark_mode),i=t||r,"
+PATCHES = ((_SENDER, _OUR_SENDER), (_CANVAS, _OUR_CANVAS), (_DARK, _OUR_DARK))
 _PACKED = re.compile(
     r'<script data-p="([^"]*)" data-ss="(\d+)" data-cs="(\d+)">(.*?)</script>', re.DOTALL
 )
@@ -69,10 +79,16 @@ class Page:
         )
 
 
+def our_script() -> str:
+    """Our script: the parts in one function, so that they see each other and nobody else sees them."""
+    parts = "\n".join(asset_path(f"page/{part}.js").read_text(encoding="utf-8") for part in PARTS)
+    return f'(() => {{\n"use strict";\n{parts}}})();\n'
+
+
 def make_page(script: str, title: str, patches: Sequence[tuple[str, str]]) -> Page:
     """viser's page with our script before its own. The loader mends the bundle, so that it stays packed as it is."""
     if "</script" in script.lower():
-        raise ServeError("page.js: must not hold the end of a script element")
+        raise ServeError("the script of the page: must not hold the end of a script element")
     source = Path(viser.__file__).parent / "client" / "build" / "index.html"
     text = source.read_text(encoding="utf-8")
     found = _PACKED.search(text)
@@ -95,6 +111,8 @@ def make_page(script: str, title: str, patches: Sequence[tuple[str, str]]) -> Pa
         text[: found.start()].replace(
             "<title>Viser</title>", f"<title>{html.escape(title)}</title>"
         )
+        + data_meta("words", words()["page"])
+        + data_meta("icons", words()["icon"])
         + f"<script>{script}</script>"
         + text[found.start() : found.start(4)]
         + loader

@@ -13,6 +13,7 @@ from viser import _gui_api, _gui_handles, _messages
 
 from .door import DOOR, Door, Held
 from .messages import is_number
+from .reports import take_report
 
 MAX_TEXT = 10_000  # characters typed into one field
 TYPING = 0.8  # seconds: on the way to "120" the field sends 1 and 12, which are not meant
@@ -28,6 +29,8 @@ async def update(api: Any, client_id: Any, message: Any) -> None:
         return
     control = api._gui_input_handle_from_uuid.get(message.uuid)
     if control is None or control._impl.removed:
+        return
+    if take_report(door, client_id, control, message.updates):
         return
     before = door.held.pop((client_id, message.uuid), None)
     if before is not None:

@@ -1,0 +1,258 @@
+"""Browser: one connected browser, its room, its history and what it shows.
+
+What a person does arrives on the event loop as a change of the state; what is computed is drawn by a worker.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from asyncio import AbstractEventLoop
+from typing import cast
+
+import viser
+
+from . import figures, guard, history, photograph, plots
+from .actions import ACTIONS
+from .fields import FIELDS
+from .forms import command
+from .glide import Glide
+from .link import query
+from .notices import from_query
+from .panel import Change, Panel
+from .pipeline import Frame, curve_key, curve_of, frame, model, photo_jpeg
+from .room import Dispatcher, Room
+from .script import Copied, Dark, Hello, Key, Report, Script, Theme, is_dark
+from .stage import Stage
+from .state import DEFAULT, ViewState, changed
+from .style import STYLE, text_size
+from .text import say
+
+log = logging.getLogger("faceambig")
+
+Contents = list[tuple[viser.GuiHtmlHandle, str]]
+
+HELLO = 0.5  # seconds to wait for the page's script to say which state the address asks for
+
+
+class Browser:
+    """One connected browser: widgets, nodes and figures of its room."""
+
+    def __init__(
+        self, client: viser.ClientHandle, dispatcher: Dispatcher, loop: AbstractEventLoop
+    ) -> None:
+        self._client, self._loop = client, loop
+        self.room = Room(DEFAULT, self, dispatcher.ring)
+        self._history = history.History()
+        self._glide = Glide(self._glided)
+        self._still = False  # whether this person wants no motion
+        self._dark = False  # whether this person's system is dark
+        self._curves_of: object = None  # what the plots show
+        self._picture_of: object = None  # what the photograph shows: (target, draft)
+        self.stage = Stage(client, self._orbited)
+        self._dress()
+        self.script = Script(client.gui, self.report)
+        people = {
+            index: subject.name for index, subject in enumerate(model(DEFAULT.model).subjects, 1)
+        }
+        self.panel = Panel(client.gui, people, self.change, self.act, narrow=self.stage.narrow)
+        style = STYLE + figures.hidden_boxes(self.panel.widgets.step_sliders)
+        self.panel.places.style.content = style
+        self.panel.show(self.room.state)
+        self._command_palette()
+
+    # ---------------------------------------------------------------- what a person does, on the loop
+
+    def open(self) -> None:
+        """Draw the first frame: of the state in the address, or of the default where no script tells."""
+        self._loop.call_later(HELLO, self.room.open)
+
+    def leave(self) -> None:
+        """The browser has gone: compute nothing more for it."""
+        self.room.left = True
+        self._glide.stop()
+
+    def change(self, change: Change) -> None:
+        """Do what a widget or a key says."""
+        self._glide.stop()
+        try:
+            state = change(self.room.state)
+        except ValueError as error:
+            self.notice(str(error))
+            state = self.room.state
+        self._go(state)
+
+    def act(self, name: str) -> None:
+        """Do an action of the table."""
+        if (change := ACTIONS[name].change) is not None:
+            self.change(change)
+            return
+        on = self._glide.on
+        self._glide.stop()
+        match name:
+            case "glide":
+                if not on:
+                    self._glide.start(self.room.state.distance, stills=self._still)
+            case "undo":
+                self._travel(history.undo(self._history))
+            case "redo":
+                self._travel(history.redo(self._history))
+            case "reset":
+                self._travel(history.reset(self._history))
+            case "copy_link":
+                self.script.copy(
+                    query(self.room.state)
+                )  # a link: the script puts the page before it
+            case "copy_command":
+                self.script.copy(command(self.room.state))
+
+    def _go(self, state: ViewState) -> None:
+        self._travel(history.change(self._history, state, time.monotonic()))
+
+    def _travel(self, to: history.History) -> None:
+        """Be where a history says, and show it: widgets at once, heads and numbers when a worker is free."""
+        before, self._history = self.room.state, to
+        self.room.go(to.now)
+        if (before.theme, before.text) != (to.now.theme, to.now.text):
+            self._dress()
+            self.script.theme(cast(Theme, to.now.theme), to.now.text)
+        self.panel.show(to.now)
+
+    def _orbited(self, azimuth: float, elevation: float, zoom: float) -> None:
+        """A hand has turned the viewer, who stands there already: the state learns it, nothing is drawn."""
+        low, high = FIELDS["zoom"].low, FIELDS["zoom"].high
+        self._go(
+            changed(
+                self.room.state,
+                view="free",
+                orbit=(azimuth, elevation),
+                zoom=min(high, max(low, zoom)),
+            )
+        )
+
+    def _glided(self, distance: float) -> None:
+        self._go(changed(self.room.state, distance=distance, camera="perspective"))
+
+    def report(self, report: Report) -> None:
+        """What the page's script tells: the address it was opened with, keys that stop things."""
+        match report:
+            case Hello():
+                self._hello(report)
+            case Key():
+                self._glide.stop()
+                if self.room.state.show == "blink":
+                    self._go(changed(self.room.state, show="both"))
+            case Dark():
+                self._dark = report.on
+                self._dress()
+            case Copied():
+                words = say("copy.done") if report.ok else say("copy.by_hand")
+                self._client.add_notification(say("app.title"), words, auto_close_seconds=3.0)
+            case _:
+                pass
+
+    def _hello(self, hello: Hello) -> None:
+        """A browser has come, or come back: go where its address says."""
+        self._still, self._dark = hello.reduced_motion, hello.dark
+        state, notices = from_query(hello.query)
+        if hello.theme is not None and state.theme == DEFAULT.theme:
+            state = changed(state, theme=hello.theme)
+        if hello.text is not None and state.text == DEFAULT.text:
+            state = changed(state, text=hello.text)
+        for words in notices:
+            self.notice(words)
+        self._travel(history.History(state))
+        self.room.open()
+
+    def _dress(self) -> None:
+        """Light or dark, as the state or the system says."""
+        self._client.gui.configure_theme(
+            dark_mode=is_dark(cast(Theme, self.room.state.theme), self._dark),
+            show_logo=False,
+            show_share_button=False,
+            brand_color=(27, 95, 193),
+            control_width="large",
+        )
+
+    def _command_palette(self) -> None:
+        for action in ACTIONS.values():
+            entry = self._client.gui.add_command(
+                say(f"action.{action.name}"),
+                description=say(f"action.{action.name}_hint"),
+                hotkey=action.key,
+                modifier=action.modifier,
+            )
+            entry.on_trigger(self._triggered(action.name))
+
+    def _triggered(self, name: str):
+        async def triggered(_event: object) -> None:
+            self.act(name)
+
+        return triggered
+
+    # ---------------------------------------------------------------- what it shows, by a worker
+
+    def notice(self, words: str) -> None:
+        """A red line in this browser."""
+        self._client.add_notification(say("app.title"), words, color="red", auto_close_seconds=8.0)
+
+    def refuse(self, error: BaseException) -> None:
+        """Say why a state could not be drawn; the last good frame stays."""
+        log.warning("a frame failed: %s", " ".join(str(error).split())[:200])
+        self.notice(say("error.failed", cause=str(error)))
+
+    def draw(self, state: ViewState, draft: bool) -> None:
+        """Compute a state and send it. Computing is done before the lock of atomic(), never inside."""
+        shown = frame(state, with_curves=not draft)
+        html = self._contents(state, shown, draft)
+        if self.room.left:  # while this was computed
+            return
+        with self._client.atomic():
+            self.stage.show(shown.scene, draft)
+            for handle, content in html:
+                handle.content = content
+        self._client.flush()
+        if not draft:
+            self._loop.call_soon_threadsafe(self._settle, state)
+
+    def _contents(self, state: ViewState, shown: Frame, draft: bool) -> Contents:
+        """What the elements of the panel show of a frame."""
+        at, scene, hide, key = self.panel.places, shown.scene, state.hide, curve_key(state)
+        cards = figures.cards(scene.numbers, hide=hide)
+        marks = photograph.photo_marks(scene.photo, crosses=False, hover=not draft)
+        html: Contents = [(at.crosses, photograph.photo_crosses(scene.photo))]
+        if self.stage.narrow:
+            html.append((at.marks, figures.side_by_side(marks, cards)))
+        else:
+            html += [(at.cards, cards), (at.marks, marks)]
+        if not draft or key == self._curves_of:  # a new target's curves cost a sweep: only at rest
+            html.append((at.plots, plots.plots(curve_of(state), scene.numbers, hide=hide)))
+            self._curves_of = key
+        if (state.target, draft) != self._picture_of and not (
+            draft and self._picture_of == (state.target, False)
+        ):
+            html.append((at.picture, photograph.photo_picture(photo_jpeg(state.target, draft))))
+            self._picture_of = (state.target, draft)
+        if not draft:
+            html += self._at_rest(state, shown)
+        return html
+
+    def _at_rest(self, state: ViewState, shown: Frame) -> Contents:
+        at, scene = self.panel.places, shown.scene
+        low, high = shown.flex_reach
+        points = len(scene.photo.observed)
+        spoken = figures.spoken(scene.numbers, hide=state.hide) + figures.heads_words(scene)
+        return [
+            (at.legend, "" if scene.legend is None else figures.legend(scene.legend)),
+            (at.spoken, spoken),
+            (at.data, self.panel.spoken(state) + text_size(state.text)),
+            (at.flex, figures.flex_words(shown.flex_words, low, high)),
+            (at.heading, figures.heading(scene.numbers.distance, state.actual, points)),
+        ]
+
+    def _settle(self, drawn: ViewState) -> None:
+        """At rest, on the loop: what the controls show is what is, even where messages crossed on the way."""
+        if not self.room.left and self.room.state == drawn:
+            self.script.address(query(drawn))
+            self.panel.show(drawn)
+            guard.restate(self._client, self.panel.controls)

@@ -1,0 +1,179 @@
+"""HeadNodes: the nodes of one head of the row: its meshes, colours, title, the scale bar and the lines below.
+
+Title and bar are on a board, a frame that always faces the viewer. Heads that share a slot share the board of the
+first of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+
+from faceambig.scene import Head
+
+from .guard import add_colours
+from .text import say
+from .viewer import Sight
+
+TITLE_AT, BAR_AT = 0.155, -0.165  # metres above and below the pivot, where that much is seen
+MARGIN, LINE, AIR = (
+    14,
+    15,
+    4,
+)  # pixels: to the edge of what is seen, of a line of words, from bar to words
+LETTER, SMALLEST = (
+    7.0,
+    0.7,
+)  # pixels of a letter, and the smallest share of it a narrow row may have
+END = 0.003  # metres: half the height of the bar's ends
+GREY = (120, 134, 148)  # of the bar, readable on both grounds
+OCCLUSION_POWER = 1.3  # without it nostrils and ears glow (no shadows)
+
+
+@dataclass(frozen=True, slots=True)
+class Board:
+    """What stands above and below a head."""
+
+    title: str
+    bar: float  # metres; 0: none
+    lines: tuple[str, ...]  # below the bar
+    room: float = np.inf  # pixels to the next head
+
+    @property
+    def foot(self) -> str:
+        """The words below the bar."""
+        length = (say("stage.bar", mm=f"{1e3 * self.bar:g}"),) if self.bar > 0 else ()
+        return "\n".join((*length, *self.lines))
+
+
+class HeadNodes:
+    """Two meshes (coarse while a hand moves) and a board."""
+
+    def __init__(self, client: viser.ClientHandle, head: Head) -> None:
+        scene, root = client.scene, f"/{head.name}"
+        self._root = scene.add_frame(root, show_axes=False)
+        self._faces, self._coarse_faces = head.faces, head.coarse_faces
+        vertices = head.vertices.astype(np.float32)
+        self._full = scene.add_mesh_simple(f"{root}/head", vertices, head.faces)
+        self._coarse: viser.MeshHandle | None = None
+        self._n_coarse = 0
+        if head.coarse_faces is not None:
+            self._n_coarse = int(head.coarse_faces.max()) + 1
+            self._coarse = scene.add_mesh_simple(
+                f"{root}/draft", vertices[: self._n_coarse], head.coarse_faces, visible=False
+            )
+        self._board = scene.add_frame(f"{root}/board", show_axes=False)
+        self._title = scene.add_label(f"{root}/board/title", head.title, anchor="bottom-center")
+        self._bar = scene.add_line_segments(
+            f"{root}/board/bar", _bar(0.05), GREY, thickness=2.0, thickness_units="screen",
+        )  # fmt: skip
+        self._foot = scene.add_label(f"{root}/board/foot", "", anchor="top-center")
+        # Directly below the root, where both meshes stand: the first of the fine vertices are the coarse ones
+        self._colours = add_colours(scene, root, shaded(head))
+        self._painted: object = head.colours
+        self._offset = 0.0  # metres along the viewer's right
+        self._wanted: Board | None = Board(head.title, 0.0, (), 0.0)  # no scene's
+        self._placed: object = (
+            None  # what the nodes stand for: viser compares every vector anew, at 50 us each
+        )
+
+    def fits(self, head: Head) -> bool:
+        """Whether these meshes have the triangles of `head`; else new ones are needed."""
+        return _equal(self._faces, head.faces) and _equal(self._coarse_faces, head.coarse_faces)
+
+    def show(self, points: NDArray[np.float64], head: Head, draft: bool) -> None:
+        """Send what changed of the head at `points` (V, 3), metres; equal arrays send nothing."""
+        draft = draft and self._coarse is not None
+        vertices, seen = points.astype(np.float32), head.opacity > 0
+        opacity = head.opacity if head.opacity < 1 else None  # None: sorted as a solid
+        if not draft:
+            self._full.vertices = vertices
+        if self._coarse is not None:  # at rest too: an invisible mesh must not keep an older face
+            self._coarse.vertices = vertices[: self._n_coarse]
+            self._coarse.visible = draft and seen
+            self._coarse.opacity = opacity
+        self._full.visible = seen and not draft
+        self._full.opacity = opacity
+        if head.colours is not self._painted:
+            self._painted = head.colours
+            self._colours.colors = shaded(head)
+
+    def write(self, board: Board | None) -> None:
+        """The words above and below; None where another head of the slot, or nothing, has them."""
+        if board == self._wanted:
+            return
+        self._wanted = board
+        self._board.visible = board is not None
+        if board is None:
+            return
+        self._title.text, self._foot.text = board.title, board.foot
+        fits = board.room / (LETTER * max(1, len(board.title)))
+        self._title.font_screen_scale = float(np.clip(fits, SMALLEST, 1.0))
+        self._foot.visible = bool(board.foot)
+        self._bar.visible = board.bar > 0
+        if board.bar > 0:
+            self._bar.points = _bar(board.bar)
+
+    def stand(self, offset: float, visible: bool = True) -> None:
+        """In the row, `offset` metres along the viewer's right; `place` puts it there."""
+        self._root.visible = visible
+        self._offset = offset
+
+    def place(self, sight: Sight, wxyz: NDArray[np.float64]) -> None:
+        """Stand along the viewer's right; the board faces the viewer and stays inside what is seen."""
+        if self._placed == (sight, self._offset, self._wanted):
+            return
+        self._placed = (sight, self._offset, self._wanted)
+        self._root.position = self._offset * sight.board[:, 0]
+        if self._wanted is None:
+            return
+        self._board.wxyz = wxyz
+        lines = 1 + self._wanted.foot.count("\n")
+        at = max(BAR_AT, END + (MARGIN + LINE * lines) * sight.pixel - sight.below)
+        self._title.position = (
+            0.0,
+            min(TITLE_AT, sight.above - (MARGIN + LINE) * sight.pixel),
+            0.0,
+        )
+        self._bar.position = (0.0, at, 0.0)
+        self._foot.position = (0.0, at - END - AIR * sight.pixel, 0.0)
+
+    def remove(self) -> None:
+        """Take the head and all that stands on it out of the scene."""
+        self._root.remove()
+
+
+def _bar(length: float) -> NDArray[np.float32]:
+    """(3, 2, 3) a line of `length` metres with two ends."""
+    x = length / 2
+    return np.array(
+        [
+            [[-x, 0, 0], [x, 0, 0]],
+            [[-x, -END, 0], [-x, END, 0]],
+            [[x, -END, 0], [x, END, 0]],
+        ],
+        dtype=np.float32,
+    )
+
+
+def _equal(a: NDArray[np.uint32] | None, b: NDArray[np.uint32] | None) -> bool:
+    return a is b or (a is not None and b is not None and np.array_equal(a, b))
+
+
+def shaded(head: Head) -> NDArray[np.uint8]:
+    """(V, 3) sRGB: the colours darkened by ambient occlusion, in linear light; legend colours stay as they are."""
+    if head.occlusion is None or not head.lit:
+        return head.colours
+    linear = _to_linear()[head.colours] * (head.occlusion[:, None] / 255.0) ** OCCLUSION_POWER
+    srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    return (255.0 * srgb).round().astype(np.uint8)
+
+
+@lru_cache(maxsize=1)
+def _to_linear() -> NDArray[np.float64]:
+    c = np.arange(256) / 255.0
+    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)

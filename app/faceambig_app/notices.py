@@ -1,0 +1,60 @@
+"""What was found in a link, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from . import link
+from .fields import FIELDS
+from .forms import LONGEST
+from .link import Finding
+from .state import DEFAULT, ViewState
+from .text import say
+
+NAMED = 5  # names of settings in one notice
+
+
+def from_query(
+    text: str, models: Collection[str] = (DEFAULT.model,)
+) -> tuple[ViewState, tuple[str, ...]]:
+    """The state of a link's query, and a sentence for each thing that its reader should know; never an exception.
+
+    models: those that a link may name.
+    """
+    state, findings = link.read(text, models)
+    return state, tuple(words(finding) for finding in findings)
+
+
+def words(finding: Finding) -> str:
+    """A finding as a sentence."""
+    names, value = _names(finding.names), finding.value
+    match finding.kind:
+        case "long":
+            return say("link.long", limit=LONGEST)
+        case "newer":
+            return say("link.newer_left_out", names=names) if names else say("link.newer")
+        case "unknown":
+            return say("link.unknown", names=names)
+        case "twice":
+            return say("link.twice", names=names)
+        case "range":
+            field = FIELDS[finding.names[0]]
+            low, high, near = (f"{x:g}" for x in (field.low, field.high, finding.near))
+            unit = f" {field.unit}" if field.unit else ""
+            return say(
+                "link.range", name=names, value=value, low=low, high=high, near=near, unit=unit
+            )
+        case "malformed":
+            return say("link.malformed", name=names, value=value)
+        case "orbit":
+            return say("link.orbit")
+        case "model":
+            return say("link.model", value=value, used=DEFAULT.model)
+        case "photo":
+            return say("link.photo")
+
+
+def _names(names: tuple[str, ...]) -> str:
+    listed = ", ".join(names[:NAMED])
+    more = len(names) - NAMED
+    return say("link.more", names=listed, count=more) if more > 0 else listed

@@ -1,0 +1,106 @@
+"""Panel: the widgets of one browser, in tabs. They say what a person changed; show() writes what is.
+
+They know no scene and no fit: what is computed comes in as HTML, into the elements that stand between the widgets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import viser
+
+from ..guard import data_html
+from ..state import ViewState
+from ..text import distance_text, say
+from . import compare, explore, flex, view
+from .widgets import Change as Change
+from .widgets import Tell, Widgets
+
+Photograph = tuple[
+    viser.GuiHtmlHandle, viser.GuiHtmlHandle, viser.GuiHtmlHandle, viser.GuiHtmlHandle
+]
+
+SIDE_WIDTH = 372  # pixels of each docked panel
+
+
+@dataclass(frozen=True, slots=True)
+class Places:
+    """Where what is computed is shown: elements of the panel."""
+
+    style: viser.GuiHtmlHandle
+    heading: viser.GuiHtmlHandle
+    picture: viser.GuiHtmlHandle  # the photograph
+    crosses: viser.GuiHtmlHandle  # its points, that seldom change
+    marks: viser.GuiHtmlHandle  # the points on it; on narrow windows the numbers stand beside
+    cards: viser.GuiHtmlHandle
+    plots: viser.GuiHtmlHandle
+    legend: viser.GuiHtmlHandle
+    flex: viser.GuiHtmlHandle  # what the flexibility modes move
+    pins: viser.GuiHtmlHandle  # the faces kept, and their distances
+    spoken: viser.GuiHtmlHandle
+    data: viser.GuiHtmlHandle  # of the page's script
+
+
+class Panel:
+    """The widgets of one browser."""
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        people: Mapping[Any, str],
+        tell: Tell,
+        act: Callable[[str], None],
+        *,
+        narrow: bool,
+    ) -> None:
+        self.widgets = w = Widgets(gui, tell, act)
+        gui.set_panel_label(say("app.title"))
+        style = gui.add_html("")
+        if narrow:  # one panel: the photograph comes first, beside the numbers
+            photo = _photo(gui)
+        else:
+            side = gui.add_panel()
+            with side.add_tab(say("panel.photo")):
+                photo = _photo(gui)
+            side.dock_left()
+            side.set_width(SIDE_WIDTH)
+        tabs = gui.add_tab_group()
+        with tabs.add_tab(say("panel.explore")):
+            explore.build_distance(w)
+            cards, legend, plots = gui.add_html(""), gui.add_html(""), gui.add_html("")
+            explore.build_rest(w, people)
+            words = flex.build(w)
+            explore.build_data(w)
+            explore.build_history(w)
+        with tabs.add_tab(say("panel.view")):
+            view.build(w)
+        with tabs.add_tab(say("panel.compare")):
+            pins = compare.build(w)
+        spoken, data = gui.add_html(""), gui.add_html("")
+        gui.main_panel.dock_right()
+        gui.main_panel.set_width(SIDE_WIDTH)
+        self.places = Places(style, *photo, cards, plots, legend, words, pins, spoken, data)
+
+    @property
+    def controls(self) -> tuple[viser.GuiInputHandle, ...]:
+        """All that hold a value of the state."""
+        return self.widgets.controls
+
+    def show(self, state: ViewState) -> None:
+        """Write a state into the widgets; on the event loop only, so an older value never overwrites a newer one."""
+        self.widgets.show(state)
+
+    def spoken(self, state: ViewState) -> str:
+        """Data for the page's script: buttons that are on, and what a screen reader says for a distance slider."""
+        texts = {
+            say(f"field.{name}"): distance_text(getattr(state, name))
+            for name in ("distance", "actual")
+        }
+        return data_html("pressed", self.widgets.pressed(state)) + data_html("valuetext", texts)
+
+
+def _photo(gui: viser.GuiApi) -> Photograph:
+    """The places of the heading, the photograph, its crosses and its circles."""
+    return gui.add_html(""), gui.add_html(""), gui.add_html(""), gui.add_html("")

@@ -1,0 +1,289 @@
+"""The curves of the page as SVG: d_L, d_S and how likely each distance is, over one axis with one cursor.
+
+Colours are CSS variables of style.STYLE. The same numbers stand in a table that is folded away.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from html import escape
+
+import numpy as np
+
+from faceambig.arrays import Array
+from faceambig.scene import Curves, Numbers
+
+from .text import NARROW, centimetres, percent_number, say
+
+WIDTH, LEFT, RIGHT = 340, 34, 330  # in SVG units
+NEAREST, FARTHEST = 0.2, 3.0  # metres, of the axis
+TICKS_CM = (20, 30, 60, 120, 240)
+D_L_TOP, D_L_BOTTOM, D_S_TOP, D_S_BOTTOM = 24, 94, 128, 222
+LIKELY_TOP, LIKELY_BOTTOM = 256, 300
+BARS_AT = (324, 310)  # of the middle halves and the 95 %, below the density
+D_L_MAX = 6.0  # percent
+AUTOMATIC_PERCENT = 5.0  # the gap of points that a program finds
+MOST_ROWS = 25  # of the table
+
+
+def plots(curves: Curves, numbers: Numbers, *, hide: Collection[str] = ()) -> str:
+    """The curves against the assumed distance, the range that cannot be told apart in words, and a table.
+
+    `hide` of Scene: "numbers" leaves out words and table, "truth" the curve of d_S, "actual" the line of the true
+    distance.
+    """
+    told, true = "numbers" not in hide, "truth" not in hide
+    top = d_s_axis(curves, numbers)
+    likely = curves.density is not None
+    last = LIKELY_BOTTOM if likely else D_S_BOTTOM
+    ticks_at = BARS_AT[0] + 7 if likely else D_S_BOTTOM
+    words = escape(_alternative(curves, numbers) if told and true else say("plot.alt_hidden"))
+    parts = [
+        f'<svg class="fa-plot" viewBox="0 0 {WIDTH} {ticks_at + 40}" role="img" aria-label="{words}">',
+        *_d_l_plot(curves),
+        *_d_s_plot(curves, numbers, top, true),
+        *(_likely_plot(curves) if likely else ()),
+        *(_tick(cm, ticks_at) for cm in TICKS_CM),
+        f'<text x="{(LEFT + RIGHT) / 2}" y="{ticks_at + 35}" text-anchor="middle">{escape(say("plot.axis"))}</text>',
+        _true_line(curves, last) if "actual" not in hide else "",
+        _cursor(numbers, top, last, true),
+        "</svg>",
+    ]
+    below = [interval_words(curves), *([likely_words(curves)] if likely else [])] if told else []
+    said = "".join(f"<p><small>{escape(text)}</small></p>" for text in below)
+    said += table(curves, true) if told else ""
+    return f'<div class="fa"><div class="fa-wide">{"".join(parts)}</div>{said}</div>'
+
+
+def d_s_axis(curves: Curves, numbers: Numbers) -> float:
+    """End of the d_S axis: 12 mm, growing in steps of 4."""
+    largest = max(float(curves.d_s_mm.max()), numbers.d_s_mm)
+    return 4.0 * max(3, int(np.ceil(largest / 4.0)))
+
+
+def told_apart(curves: Curves) -> tuple[float, float] | None:
+    """The range of distances around the best whose d_L a person accepts, metres; None if there is none.
+
+    Between two distances of the sweep the curve is taken as straight over the logarithm.
+    """
+    over = curves.d_l_percent - curves.tolerance_percent
+    best = int(np.argmin(over))
+    if over[best] > 0:
+        return None
+    return _crossing(curves.distances, over, best, -1), _crossing(curves.distances, over, best, 1)
+
+
+def _crossing(distances: Array, over: Array, start: int, step: int) -> float:
+    """Where `over` first rises above 0 on the way from `start`; the end of the sweep if it does not."""
+    at = start
+    while 0 <= at + step < len(over):
+        if over[at + step] > 0:
+            share = -over[at] / (over[at + step] - over[at])
+            return float(distances[at] * (distances[at + step] / distances[at]) ** share)
+        at += step
+    return float(distances[at])
+
+
+def interval_words(curves: Curves) -> str:
+    """Which distances cannot be told apart, as a sentence."""
+    found = told_apart(curves)
+    percent = f"{curves.tolerance_percent:g}{NARROW}%"
+    if found is None:
+        return say("plot.none", tolerance=percent)
+    return say(
+        "plot.interval",
+        low=_whole(found[0]),
+        high=centimetres(_rounded(found[1])),
+        tolerance=percent,
+    )
+
+
+def likely_words(curves: Curves) -> str:
+    """The intervals of the posterior and what lies beyond the axis, as sentences."""
+    words = []
+    for share, (low, high) in zip((50, 95), curves.intervals, strict=False):
+        near = centimetres(_rounded(low))
+        if np.isinf(high):
+            words.append(say("plot.likely_open", share=share, low=near))
+        else:
+            far = centimetres(_rounded(high))
+            words.append(say("plot.likely_range", share=share, low=near, high=far))
+    if curves.beyond >= 0.005:
+        end = centimetres(float(curves.distances[-1]))
+        words.append(say("plot.beyond", share=f"{100 * curves.beyond:.0f}{NARROW}%", end=end))
+    return " ".join(words)
+
+
+def _rounded(metres: float) -> float:
+    """To whole centimetres, as the words say "about"."""
+    return round(100 * metres) / 100
+
+
+def _whole(metres: float) -> str:
+    return f"{100 * metres:.0f}"
+
+
+def table(curves: Curves, true: bool = True) -> str:
+    """The curves as numbers, folded away; at most MOST_ROWS of them, first and last among them."""
+    n = len(curves.distances)
+    rows = np.unique(np.linspace(0, n - 1, min(n, MOST_ROWS)).round().astype(int))
+    heads = [say("plot.axis"), say("plot.d_l"), *([say("plot.d_s")] if true else [])]
+    likely = curves.density
+    if likely is not None:
+        heads.append(say("plot.likely_share"))
+    body = []
+    for row in rows:
+        cells = [percent_number(float(curves.d_l_percent[row]))]
+        if true:
+            cells.append(f"{curves.d_s_mm[row]:.1f}")
+        if likely is not None:
+            cells.append(f"{100 * likely[row]:.0f}")
+        numbers = "".join(f"<td>{cell}</td>" for cell in cells)
+        body.append(
+            f'<tr><th scope="row">{_whole(float(curves.distances[row]))}</th>{numbers}</tr>'
+        )
+    head = "".join(f'<th scope="col">{escape(text)}</th>' for text in heads)
+    return (
+        f'<details><summary>{escape(say("plot.table"))}</summary><div class="fa-wide"><table><thead><tr>{head}</tr>'
+        f"</thead><tbody>{''.join(body)}</tbody></table></div></details>"
+    )
+
+
+def _alternative(curves: Curves, numbers: Numbers) -> str:
+    return say(
+        "plot.alt",
+        d_l=f"{percent_number(curves.d_l_percent.min())} - {percent_number(curves.d_l_percent.max())}{NARROW}%",
+        d_s=f"{curves.d_s_mm.min():.1f} - {curves.d_s_mm.max():.1f}{NARROW}mm",
+        now=centimetres(numbers.distance),
+    )
+
+
+def _d_l_plot(curves: Curves) -> list[str]:
+    band, automatic = _d_l(curves.tolerance_percent), _d_l(AUTOMATIC_PERCENT)
+    line = _line(_x(curves.distances), _y(curves.d_l_percent, D_L_MAX, D_L_TOP, D_L_BOTTOM))
+    return [
+        _title(say("plot.d_l"), D_L_TOP, "dl"),
+        f'<path d="M{LEFT} {band:.1f}H{RIGHT}V{D_L_BOTTOM}H{LEFT}z" fill="var(--fa-band)"/>',
+        *(_grid(value, D_L_MAX, D_L_TOP, D_L_BOTTOM) for value in (0, 3, 6)),
+        f'<path d="M{LEFT} {automatic:.1f}H{RIGHT}" stroke="var(--fa-dim)" stroke-dasharray="5 4"/>',
+        _note(automatic + 12, say("plot.automatic")),
+        _note(band + 13, say("plot.band")),
+        f'<polyline points="{line}" fill="none" stroke="var(--fa-dl)" stroke-width="2.2" stroke-dasharray="6 3"/>',
+    ]
+
+
+def _d_s_plot(curves: Curves, numbers: Numbers, top: float, true: bool) -> list[str]:
+    line = _line(_x(curves.distances), _y(curves.d_s_mm, top, D_S_TOP, D_S_BOTTOM))
+    title = (
+        say("plot.d_s")
+        if not numbers.reference
+        else say("plot.d_s_to", reference=numbers.reference)
+    )
+    return [
+        _title(title, D_S_TOP, "ds"),
+        *(_grid(value, top, D_S_TOP, D_S_BOTTOM) for value in range(0, int(top) + 1, 4)),
+        f'<polyline points="{line}" fill="none" stroke="var(--fa-ds)" stroke-width="2.2"/>'
+        if true
+        else _note((D_S_TOP + D_S_BOTTOM) / 2 + 4, say("number.hidden")),
+    ]
+
+
+def _likely_plot(curves: Curves) -> list[str]:
+    """How likely each distance is: an area of equal share a width of the axis, and the two intervals below."""
+    assert curves.density is not None
+    x, y = _x(curves.distances), _y(curves.density, 1.0, LIKELY_TOP, LIKELY_BOTTOM)
+    area = f"M{x[0]:.1f} {LIKELY_BOTTOM}L{_line(x, y)}L{x[-1]:.1f} {LIKELY_BOTTOM}z"
+    parts = [
+        _title(say("plot.likely"), LIKELY_TOP, "ink"),
+        f'<path d="{area}" fill="var(--fa-band)" stroke="var(--fa-ink)" stroke-width="1.4"/>',
+    ]
+    for share, at, width, (low, high) in zip(
+        (50, 95), BARS_AT, (6, 3), curves.intervals, strict=False
+    ):
+        a, b = (float(_x(np.clip(end, NEAREST, FARTHEST))) for end in (low, high))
+        parts.append(f'<text x="{LEFT - 4}" y="{at + 4}" text-anchor="end">{share}{NARROW}%</text>')
+        parts.append(
+            f'<path d="M{a:.1f} {at}H{b:.1f}" stroke="var(--fa-ink)" stroke-width="{width}"/>'
+        )
+        if high > FARTHEST:  # it goes on
+            parts.append(f'<path d="M{b + 1:.1f} {at - 5}l7 5l-7 5z" fill="var(--fa-ink)"/>')
+    return parts
+
+
+def _title(text: str, top: int, tone: str) -> str:
+    return (
+        f'<text class="t" x="2" y="{top - 10}" style="fill:var(--fa-{tone})">{escape(text)}</text>'
+    )
+
+
+def _note(y: float, text: str) -> str:
+    return f'<text x="{RIGHT - 3}" y="{y:.1f}" text-anchor="end">{escape(text)}</text>'
+
+
+def _x(metres: Array | float) -> Array:
+    low, high = np.log2(NEAREST), np.log2(FARTHEST)
+    return LEFT + (np.log2(metres) - low) / (high - low) * (RIGHT - LEFT)
+
+
+def _y(values: Array, top_value: float, top: int, bottom: int) -> Array:
+    return bottom - np.clip(values, 0, top_value) / top_value * (bottom - top)
+
+
+def _at(value: float, top_value: float, top: int, bottom: int) -> float:
+    return float(_y(np.array(value), top_value, top, bottom))
+
+
+def _d_l(value: float) -> float:
+    return _at(value, D_L_MAX, D_L_TOP, D_L_BOTTOM)
+
+
+def _line(x: Array, y: Array) -> str:
+    return " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
+
+
+def _grid(value: float, top_value: float, top: int, bottom: int) -> str:
+    y = _at(value, top_value, top, bottom)
+    return (
+        f'<path d="M{LEFT} {y:.1f}H{RIGHT}" stroke="var(--fa-line)"/>'
+        f'<text x="{LEFT - 6}" y="{y + 4:.1f}" text-anchor="end">{value:g}</text>'
+    )
+
+
+def _tick(cm: int, at: int) -> str:
+    x = float(_x(cm / 100))
+    return (
+        f'<path d="M{x:.1f} {at}v4" stroke="var(--fa-dim)"/>'
+        f'<text x="{x:.1f}" y="{at + 17}" text-anchor="middle">{cm}</text>'
+    )
+
+
+def _upright(x: float, last: int) -> str:
+    """A line down all plots, with room for their titles."""
+    plots_at = ((D_L_TOP, D_L_BOTTOM), (D_S_TOP, D_S_BOTTOM), (LIKELY_TOP, LIKELY_BOTTOM))
+    return "".join(f"M{x:.1f} {top}V{bottom}" for top, bottom in plots_at if bottom <= last)
+
+
+def _true_line(curves: Curves, last: int) -> str:
+    if not NEAREST <= curves.true_distance <= FARTHEST:
+        return ""
+    x = float(_x(curves.true_distance))
+    anchor, shift = ("end", -4) if x > (LEFT + RIGHT) / 2 else ("start", 4)
+    return (
+        f'<path d="{_upright(x, last)}" stroke="var(--fa-dim)" stroke-dasharray="2 3"/>'
+        f'<text x="{x + shift:.1f}" y="{D_S_TOP + 10}" text-anchor="{anchor}">'
+        f"{escape(say('plot.true', distance=centimetres(curves.true_distance)))}</text>"
+    )
+
+
+def _cursor(numbers: Numbers, d_s_top: float, last: int, true: bool) -> str:
+    if numbers.distance is None:
+        return ""
+    x = float(_x(numbers.distance))
+    a, b = _d_l(numbers.d_l_percent), _at(numbers.d_s_mm, d_s_top, D_S_TOP, D_S_BOTTOM)
+    square = (
+        f'<rect x="{x - 4.2:.1f}" y="{b - 4.2:.1f}" width="8.4" height="8.4" fill="var(--fa-ds)"/>'
+    )
+    return (
+        f'<path d="{_upright(x, last)}" stroke="var(--fa-ink)" stroke-width="1.6"/>'
+        f'<circle cx="{x:.1f}" cy="{a:.1f}" r="4.5" fill="var(--fa-dl)"/>{square if true else ""}'
+    )

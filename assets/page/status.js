@@ -1,0 +1,53 @@
+// ---- the line that says how it stands -----------------------------------------------------------------------------------
+const BACK = 4000; // milliseconds
+const line = document.createElement("div");
+line.className = "fa-status";
+line.setAttribute("role", "status");
+let wasLost = false;
+let clearing = null;
+
+function canDraw() {
+  try {
+    const canvas = document.createElement("canvas");
+    const gl = canvas.getContext("webgl2") ?? canvas.getContext("webgl");
+    gl?.getExtension("WEBGL_lose_context")?.loseContext(); // browsers keep only a few
+    return gl !== null;
+  } catch {
+    return false;
+  }
+}
+
+function say(text) {
+  line.textContent = text;
+}
+
+onConnection.push((there) => {
+  clearTimeout(clearing);
+  if (!there) {
+    wasLost = true;
+    say(words.lost);
+  } else if (wasLost) {
+    wasLost = false;
+    say(words.back);
+    clearing = setTimeout(rest, BACK);
+  }
+});
+
+let rest = () => say("");
+
+function begin() {
+  document.body.append(line);
+  if (!canDraw()) rest = () => say(words.no_webgl);
+  rest();
+}
+document.addEventListener("DOMContentLoaded", begin);
+
+// ---- what comes with the page, and what changes in it ---------------------------------------------------------------------
+for (const element of document.querySelectorAll("meta[data-faceambig]")) read(element);
+
+new MutationObserver(() => {
+  watchScene();
+  nameControls();
+  nameCopies();
+  readPhoto();
+}).observe(document, { childList: true, subtree: true });
