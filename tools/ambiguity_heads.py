@@ -14,7 +14,8 @@ from faceambig.arrays import Array
 from faceambig.metrics import surface_difference
 from faceambig.observation import portrait_camera
 from faceambig.render.canvas import THIN, Picture
-from faceambig.render.overlay import draw, percent
+from faceambig.render.gauges import percent
+from faceambig.render.overlay import draw
 from faceambig.scene import Head, Legend, Photo, Scene
 
 HEADS = 0.75  # scale of the strips: 1200 pixels wide
