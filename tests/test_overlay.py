@@ -33,15 +33,15 @@ def canvases(monkeypatch):
             super().__init__(*arguments)
             made.append(self)
 
-    def nothing(head, view, width, height, pixels_per_metre, **options):
-        return np.zeros((height, width, 4), dtype=np.uint8)
+    def nothing(scene, heads, view, size, pixels_per_metre):
+        return np.zeros((size[1], size[0], 4), dtype=np.uint8)
 
     def blank(vertices, photo, focal, size, **options):
         return np.full((size[1], size[0], 3), 200, dtype=np.uint8)
 
     monkeypatch.setattr(overlay, "Canvas", Kept)
     monkeypatch.setattr(overlay.painter, "paint", blank)
-    monkeypatch.setattr(overlay.gl, "render_head", nothing)
+    monkeypatch.setattr(overlay.together, "picture", nothing)
     return made
 
 

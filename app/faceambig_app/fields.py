@@ -47,7 +47,7 @@ class Field:
         return "--" + self.name.replace("_", "-")
 
 
-OVERLAYS = ("points", "names", "errors", "rays", "pyramid", "ghost", "scale", "outline")
+OVERLAYS = ("points", "marks", "names", "errors", "rays", "pyramid", "ghost", "scale", "outline")
 VIEWS = ("front", "three_quarter", "side", "top", "camera", "free")
 
 _ROWS = (

@@ -103,7 +103,8 @@ class ViewState(
     view: str = "three_quarter"
     orbit: tuple[float, float] | None = None  # degrees: azimuth, elevation
     zoom: float = 1.0
-    overlays: tuple[str, ...] = ("points", "ghost", "scale")
+    # Neither ghost nor marks at first: the one patches the fitted face, the others hide its eyes and mouth
+    overlays: tuple[str, ...] = ("points", "scale")
     error_scale: int = 1
     fade: float = 0.5
     hide: tuple[str, ...] = ()

@@ -17,7 +17,7 @@ from ..model import FaceModel, Subject
 from ..scene import Lines, Marks, Photo
 from .face import Face, centre_of
 
-OVERLAYS = ("points", "names", "errors", "rays", "pyramid", "ghost", "scale", "outline")
+OVERLAYS = ("points", "marks", "names", "errors", "rays", "pyramid", "ghost", "scale", "outline")
 LIFT = 1.5e-3  # metres above the surface: else a mark's own triangle hides half of it
 FARTHEST = 0.6  # metres from the head: a camera beyond is drawn here, with a break mark
 PYRAMID = 0.08  # metres from the camera to the photograph in front of it

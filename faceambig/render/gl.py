@@ -14,7 +14,7 @@ import queue
 import sys
 import threading
 import types
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from functools import cache
 from typing import Any, NamedTuple, TypeVar
@@ -116,19 +116,61 @@ def render_head(
     middle: the point of the picture's middle, metres along the viewer's right and up from the head's origin. Parallel
     rays: one scale in the whole picture. marked: vertices that get a bead. NoRendererError where nothing can draw.
     """
+    layer = render_layer(head, view, width, height, pixels_per_metre, middle=middle, marked=marked)
+    return _reduced(layer.colour, layer.factor)
+
+
+class Layer(NamedTuple):
+    """One head as the frame buffer has it."""
+
+    colour: NDArray[np.uint8]  # (factor * height, factor * width, 4) premultiplied
+    depth: NDArray[np.float32]  # of the same size, growing away from the viewer; 0: nothing there
+    factor: int
+
+
+def render_layer(
+    head: Head,
+    view: View,
+    width: int,
+    height: int,
+    pixels_per_metre: float,
+    *,
+    middle: tuple[float, float] = (0.0, 0.0),
+    marked: IntArray | None = None,
+    beads: Sequence[tuple[Array, tuple[int, int, int]]] = (),
+) -> Layer:
+    """As `render_head`, with its depth. beads: points (M, 3) metres in the head's axes and the sRGB of their balls."""
     R = viewer_rotation(view)
     points = head.vertices @ R.T
     points[:, :2] -= middle
     normals = vertex_normals(head.vertices, head.faces) @ R.T
     colours = _lit_colours(head, normals) if head.lit else _shown_colours(head, normals)
     mesh = Mesh(points, normals, head.faces, colours, head.lit)
+    radius = BEAD * height / pixels_per_metre
     if marked is not None and len(marked):
-        mesh = _with_beads(mesh, points[marked], BEAD * height / pixels_per_metre)
+        mesh = _with_beads(mesh, points[marked], radius, BEAD_COLOUR)
+    for at, colour in beads:
+        mesh = _with_beads(mesh, at @ R.T - (*middle, 0.0), radius, colour)
     factor = 2 if 4 * width * height <= LARGEST else 1
     size = (factor * width, factor * height)
     half = (width / (2 * pixels_per_metre), height / (2 * pixels_per_metre))
-    large = _studio().call(lambda pyrender, renderer: _frame(pyrender, renderer, mesh, half, size))
-    return _reduced(large, factor)
+    drawn = _studio().call(lambda pyrender, renderer: _frame(pyrender, renderer, mesh, half, size))
+    return Layer(*drawn, factor)
+
+
+def over_each_other(layers: Sequence[Layer], opacities: Sequence[float]) -> NDArray[np.uint8]:
+    """(height, width, 4) RGBA of layers of one size: at each sample from the farthest to the nearest, by opacity."""
+    if len(layers) == 1 and opacities[0] == 1:
+        return _reduced(layers[0].colour, layers[0].factor)
+    depth = np.stack([np.where(layer.depth > 0, layer.depth, np.inf) for layer in layers])
+    order = np.argsort(-depth, axis=0, kind="stable")
+    colours = np.stack([layer.colour for layer in layers]).astype(np.float32)
+    colours *= np.asarray(opacities, dtype=np.float32)[:, None, None, None]
+    out = np.zeros(colours.shape[1:], dtype=np.float32)
+    for rank in order:
+        over = np.take_along_axis(colours, rank[None, :, :, None], axis=0)[0]
+        out = over + out * (1.0 - over[..., 3:] / 255.0)
+    return _reduced(out, layers[0].factor)
 
 
 def _lit_colours(head: Head, normals: Array) -> Array:
@@ -162,7 +204,7 @@ def _shown_colours(head: Head, normals: Array) -> Array:
     return head.colours / 255.0 * shade[:, None]
 
 
-def _with_beads(mesh: Mesh, at: Array, radius: float) -> Mesh:
+def _with_beads(mesh: Mesh, at: Array, radius: float, srgb: tuple[int, int, int]) -> Mesh:
     """The mesh with a ball of `radius` metres at each of `at` (M, 3): hidden where the face hides it."""
     import trimesh
 
@@ -170,7 +212,7 @@ def _with_beads(mesh: Mesh, at: Array, radius: float) -> Mesh:
     shape = np.asarray(ball.vertices)
     starts = len(mesh.points) + len(shape) * np.arange(len(at))
     triangles = (starts[:, None, None] + np.asarray(ball.faces)).reshape(-1, 3).astype(np.uint32)
-    colour = np.array(BEAD_COLOUR) / 255.0
+    colour = np.array(srgb) / 255.0
     shown = srgb_to_linear(colour) if mesh.lit else colour
     return Mesh(
         np.concatenate([mesh.points, (at[:, None] + radius * shape).reshape(-1, 3)]),
@@ -186,7 +228,7 @@ def srgb_to_linear(colours: ArrayLike) -> Array:
     return np.asarray(colours, dtype=np.float64) ** 2.2
 
 
-def _reduced(large: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:
+def _reduced(large: NDArray[np.uint8] | NDArray[np.float32], factor: int) -> NDArray[np.uint8]:
     """The picture at 1/factor, averaged with premultiplied alpha: no dark seam at the outline."""
     picture = large.astype(np.float32)
     alpha = picture[..., 3:]
@@ -201,11 +243,11 @@ def _reduced(large: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:
 
 def _frame(
     pyrender: Any, renderer: Any, mesh: Mesh, half: tuple[float, float], size: tuple[int, int]
-) -> NDArray[np.uint8]:
-    """(H, W, 4) RGBA of a mesh, straight from the frame buffer. Runs in the render thread."""
+) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+    """(H, W, 4) RGBA and (H, W) depth of a mesh, straight from the frame buffer. Runs in the render thread."""
     renderer.viewport_width, renderer.viewport_height = size
     flags = pyrender.RenderFlags.RGBA | (0 if mesh.lit else pyrender.RenderFlags.FLAT)
-    return renderer.render(_scene(pyrender, mesh, half), flags=flags)[0]
+    return renderer.render(_scene(pyrender, mesh, half), flags=flags)
 
 
 def _scene(pyrender: Any, mesh: Mesh, half: tuple[float, float]) -> Any:

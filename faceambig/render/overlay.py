@@ -8,15 +8,16 @@ on room of at least its own default size: a smaller picture shrinks all of it, a
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import cv2
 import numpy as np
 
 from ..arrays import Array
 from ..scene import Head, Legend, Photo, Scene, View
-from . import gl, painter, plots
+from . import painter, plots, together
 from .canvas import FINE, THIN, Canvas, Colour, Picture, Place
 from .plots import D_L, D_S, DIM, INK, LINE
 
@@ -120,7 +121,7 @@ def _layout(scene: Scene) -> tuple[Callable[[Sheet], None], tuple[int, int]]:
     """What lays the scene out, and the least room it needs."""
     if scene.through_camera:
         return _through_camera, USUAL
-    if len(scene.views) > 1 or len(scene.heads) > 2:
+    if len(scene.views) > 1 or len(together.places(scene)) > 2:
         return _strip, STRIP
     return _usual, USUAL
 
@@ -161,7 +162,8 @@ def _usual(sheet: Sheet) -> None:
         canvas.text(x, y + CARD_HEIGHT + 26, *warning, most=COLUMN)
     if scene.curves is not None:
         y += CARD_HEIGHT + warned + 38
-        plots.curves(canvas, scene.curves, scene.numbers, sheet.words, x, y, COLUMN)
+        true = "truth" not in scene.hide
+        plots.curves(canvas, scene.curves, scene.numbers, sheet.words, x, y, COLUMN, true=true)
 
 
 def _heads(sheet: Sheet, x: float, width: float) -> None:
@@ -169,17 +171,18 @@ def _heads(sheet: Sheet, x: float, width: float) -> None:
     canvas, scene = sheet.canvas, sheet.scene
     height = canvas.room[1]
     view = scene.views[0]
-    cell = (width - 2 * MARGIN) / max(2, len(scene.heads))
+    places = together.places(scene)
+    cell = (width - 2 * MARGIN) / max(2, len(places))
     ppm = min(cell / HEAD_WIDTH, (height - 230) / (ROW_HEIGHT * view.half_height))
     tall = ROW_HEIGHT * view.half_height * ppm
     top = (height - tall) / 2 - 6
-    left = x + (width - cell * len(scene.heads)) / 2
-    for index, head in enumerate(scene.heads):
+    left = x + (width - cell * len(places)) / 2
+    for index, heads in enumerate(places):
         middle = left + (index + 0.5) * cell
-        _head(sheet, head, view, (middle, top + tall / 2), (cell, tall), ppm)
-        lines = head.caption or ((_assumed(sheet, index), "dim"),)
+        _place(sheet, heads, view, (middle, top + tall / 2), (cell, tall), ppm)
+        lines = heads[0].caption or ((_assumed(sheet, heads), "dim"),)
         start = top - 18 - 20 * len(lines)
-        canvas.text(middle, start, head.title, 18, INK, 650, anchor="middle", most=cell - 8)
+        canvas.text(middle, start, _title(heads), 18, INK, 650, anchor="middle", most=cell - 8)
         for row, (line, tone) in enumerate(lines, start=1):
             canvas.text(
                 middle, start + 2 + 20 * row, line, 14, TONES[tone], anchor="middle", most=cell - 8
@@ -200,15 +203,16 @@ def _strip(sheet: Sheet) -> None:
     beside = 176 if scene.legend is not None else MARGIN
     lines = max(len(head.caption) for head in scene.heads)
     top, bottom = 58, 56 + 22 * lines
-    cell = (width - MARGIN - beside) / len(scene.heads)
+    places = together.places(scene)
+    cell = (width - MARGIN - beside) / len(places)
     tall = (height - top - bottom) / len(scene.views)
     ppm = min(cell / HEAD_WIDTH, *(tall / (ROW_HEIGHT * view.half_height) for view in scene.views))
-    for index, head in enumerate(scene.heads):
+    for index, heads in enumerate(places):
         middle = MARGIN + (index + 0.5) * cell
-        canvas.text(middle, 38, head.title, 19, INK, 650, anchor="middle", most=cell - 8)
+        canvas.text(middle, 38, _title(heads), 19, INK, 650, anchor="middle", most=cell - 8)
         for row, view in enumerate(scene.views):
-            _head(sheet, head, view, (middle, top + (row + 0.5) * tall), (cell, tall), ppm)
-        for row, (line, tone) in enumerate(head.caption):
+            _place(sheet, heads, view, (middle, top + (row + 0.5) * tall), (cell, tall), ppm)
+        for row, (line, tone) in enumerate(heads[0].caption):
             y = height - bottom + 22 + 22 * row
             canvas.text(middle, y, line, 15, TONES[tone], anchor="middle", most=cell - 6)
     if scene.legend is not None:
@@ -230,10 +234,10 @@ def _through_camera(sheet: Sheet) -> None:
     side = min((width - 2 * MARGIN - gap) / 2, (height - 84 - CARD_HEIGHT - 40) / share)
     top, tall = 84, side * share
     left = (width - 2 * side - gap) / 2
-    titles = [head.title for head in scene.heads] + ["", ""]
+    titles = {head.name: head.title for head in scene.heads}
     columns = (
-        (left, titles[0], scene.photo.caption),
-        (left + side + gap, titles[1], _assumed(sheet, 1)),
+        (left, titles.get("true", ""), scene.photo.caption),
+        (left + side + gap, titles.get("fit", ""), _assumed(sheet, scene.heads[-1:])),
     )
     for x, title, line in columns:
         end = canvas.text(x, top - 16, title, 18, INK, 650, most=side)
@@ -252,30 +256,35 @@ def _through_camera(sheet: Sheet) -> None:
 # ---- heads and photographs ----
 
 
-def _head(
+def _place(
     sheet: Sheet,
-    head: Head,
+    heads: Sequence[Head],
     view: View,
     middle: tuple[float, float],
     room: tuple[float, float],
     ppm: float,
 ) -> None:
-    """A head with the scene's pivot at `middle`; ppm: units for a metre. It may stand out of its room a little."""
+    """Heads with the scene's pivot at `middle`; ppm: units for a metre. They may stand out of their room a little."""
     unit = sheet.canvas.unit
     size = (round(1.16 * room[0] * unit), round(1.04 * room[1] * unit))
-    key = (head.name, view)
+    key = (*(head.name for head in heads), view)
     if key not in sheet.pictures:
-        pivot = gl.viewer_rotation(view) @ sheet.scene.pivot
-        sheet.pictures[key] = gl.render_head(
-            head, view, *size, ppm * unit, middle=(pivot[0], pivot[1]), marked=sheet.scene.landmarks
-        )
+        sheet.pictures[key] = together.picture(sheet.scene, heads, view, size, ppm * unit)
     left, top = middle[0] - size[0] / (2 * unit), middle[1] - size[1] / (2 * unit)
     sheet.canvas.paste(left, top, sheet.pictures[key])
+    for ends, tone in together.segments(sheet.scene, heads, view):
+        for a, b in (middle + ppm * ends * (1.0, -1.0)).tolist():
+            sheet.canvas.line((a[0], a[1]), (b[0], b[1]), together.TONES[tone], 0.8)
 
 
-def _assumed(sheet: Sheet, index: int) -> str:
-    """The line under a title where the scene gives none: the distance this face belongs to."""
-    if index == 0 and len(sheet.scene.heads) > 1:
+def _title(heads: Sequence[Head]) -> str:
+    """What stands above the heads of one place."""
+    return " / ".join(head.title for head in heads if head.title)
+
+
+def _assumed(sheet: Sheet, heads: Sequence[Head]) -> str:
+    """The line under a title where the scene gives none: the distance these faces belong to."""
+    if len(heads) == 1 and heads[0].name == "true":
         return sheet.scene.photo.caption
     distance = sheet.scene.numbers.distance
     if distance is None:
@@ -299,7 +308,37 @@ def _photo(sheet: Sheet, x: float, y: float, width: float, *, fit: bool = False)
     picture = sheet.pictures[fit]
     at = sheet.canvas.paste(x, y, picture, radius=8)
     step = picture.shape[1] / photo.width
-    marks(sheet.canvas, np.array(at), step, photo, (2.3 + 0.0055 * width) * sheet.canvas.unit)
+    radius = (2.3 + 0.0055 * width) * sheet.canvas.unit
+    _photo_lines(sheet.canvas, np.array(at), step, photo)
+    if photo.points_shown:
+        marks(sheet.canvas, np.array(at), step, photo, radius)
+    if photo.names_shown:
+        _names(sheet, np.array(at), step, radius)
+
+
+def _photo_lines(canvas: Canvas, at: Array, step: float, photo: Photo) -> None:
+    """The fitted face's outline, and from each cross the line to its circle, lengthened."""
+    unit = canvas.unit
+    if photo.outline is not None and len(photo.outline):
+        xy = (at + step * photo.outline) / unit
+        for a, b in pairwise(xy):
+            if np.isfinite([a, b]).all():
+                canvas.line((a[0], a[1]), (b[0], b[1]), PROJECTED, 1.3)
+    if photo.error_scale:
+        gaps = photo.error_scale * (photo.projected - photo.observed)
+        for a, b in zip(photo.observed, photo.observed + gaps, strict=True):
+            (x, y), (u, v) = (at + step * a) / unit, (at + step * b) / unit
+            if np.isfinite([x, y, u, v]).all():
+                canvas.line((x, y), (u, v), OBSERVED, 1.3)
+
+
+def _names(sheet: Sheet, at: Array, step: float, radius: float) -> None:
+    """The name of each point beside its cross."""
+    canvas, photo = sheet.canvas, sheet.scene.photo
+    for name, point in zip(photo.names, photo.observed, strict=True):
+        x, y = (at + step * point + radius) / canvas.unit
+        if np.isfinite([x, y]).all():
+            canvas.text(x, y, name, 7.5, INK)
 
 
 def marks(canvas: Canvas, at: Array, step: float, photo: Photo, radius: float) -> None:
@@ -355,15 +394,17 @@ def _key(sheet: Sheet, x: float, y: float, width: float) -> None:
 
 
 def _cards(sheet: Sheet, x: float, y: float, width: float) -> None:
-    """The two numbers whose disagreement is the lesson."""
-    numbers, curves = sheet.scene.numbers, sheet.scene.curves
+    """The two numbers whose disagreement is the lesson; what is hidden is asked for."""
+    numbers, curves, hide = sheet.scene.numbers, sheet.scene.curves, sheet.scene.hide
     note = sheet.words["d_l_note_alone"]
     if curves is not None:
         note = sheet.words["d_l_note"].format(tolerance=f"{curves.tolerance_percent:g}")
     half = (width - 12) / 2
     d_l, d_s = percent(numbers.d_l_percent), f"{numbers.d_s_mm:.1f}"
-    _card(sheet, "d_l", (d_l, "%"), note, x, y, half)
-    _card(sheet, "d_s", (d_s, "mm"), sheet.words["d_s_note"], x + half + 12, y, half)
+    shown = (d_l, "%") if "numbers" not in hide else ("?", "")
+    _card(sheet, "d_l", shown, note, x, y, half)
+    shown = (d_s, "mm") if not hide & {"numbers", "truth"} else ("?", "")
+    _card(sheet, "d_s", shown, sheet.words["d_s_note"], x + half + 12, y, half)
 
 
 def _card(
@@ -398,6 +439,8 @@ def percent(value: float) -> str:
 def _bar(sheet: Sheet, x: float, y: float, ppm: float, key: str, *, beside: bool = False) -> float:
     """The scale bar, its words below or beside it; returns where it ends."""
     canvas, end = sheet.canvas, x + sheet.scene.scale_bar * ppm
+    if not sheet.scene.scale_bar:
+        return x
     canvas.line((x, y), (end, y), INK, 1.6)
     for side in (x, end):
         canvas.line((side, y - 5), (side, y + 5), INK, 1.6)

@@ -49,8 +49,13 @@ def curves(
     x: float,
     y: float,
     width: float,
+    *,
+    true: bool = True,
 ) -> None:
-    """Both plots with their upper left at (x, y), HEIGHT high; the far-away camera has its own place at the right."""
+    """Both plots with their upper left at (x, y), HEIGHT high; the far-away camera has its own place at the right.
+
+    true: whether d_S is told: without it its plot is empty, for those who are to say first what they expect.
+    """
     left, far = x + 26, x + width - 12
     right = far - 22
     d_l = max(curves.d_l_percent.max(), curves.orthographic[0], numbers.d_l_percent)
@@ -75,16 +80,20 @@ def curves(
         (upper, curves.d_l_percent, D_L, (6.0, 3.0)),
         (lower, curves.d_s_mm, D_S, None),
     ):
+        if colour is D_S and not true:
+            continue
         shown = np.interp(inside, curves.distances, value)
         canvas.curve(axes.x(inside), axes.y(shown), colour, 2.2, dash=dash)
     canvas.circle((far, float(upper.y(curves.orthographic[0]))), 3.6, D_L, 1.5)
-    canvas.square((far, float(lower.y(curves.orthographic[1]))), 3.4, D_S, 1.5)
+    if true:
+        canvas.square((far, float(lower.y(curves.orthographic[1]))), 3.4, D_S, 1.5)
     if numbers.distance is None or 0.2 <= numbers.distance <= 3.0:
         at = far if numbers.distance is None else float(lower.x(numbers.distance))
         for axes in (upper, lower):
             canvas.line((at, axes.top - 2), (at, axes.bottom), INK, 1.5)
         canvas.circle((at, float(upper.y(numbers.d_l_percent))), 4.6, D_L)
-        canvas.square((at, float(lower.y(numbers.d_s_mm))), 4.3, D_S)
+        if true:
+            canvas.square((at, float(lower.y(numbers.d_s_mm))), 4.3, D_S)
 
 
 def _grid(canvas: Canvas, axes: Axes, step: int, end: float) -> None:
