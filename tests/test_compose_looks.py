@@ -226,7 +226,7 @@ def lines_of(scene: Scene, name: str) -> dict[str, Lines]:
 
 
 def test_marks_lie_a_little_above_the_landmarks_of_their_head():
-    scene = composed(overlays=("points", "names"))
+    scene = composed(overlays=("points", "marks", "names"))
     assert [(m.head, m.tone) for m in scene.marks] == [("true", "seen"), ("fit", "d_l")]
     for mark, head in zip(scene.marks, scene.heads, strict=True):
         normals = vertex_normals(head.vertices, head.faces)[AT]
@@ -237,7 +237,7 @@ def test_marks_lie_a_little_above_the_landmarks_of_their_head():
     without = composed(overlays=())
     assert without.marks == ()
     assert not without.photo.points_shown
-    assert composed(overlays=("points",)).marks[0].names == ()
+    assert composed(overlays=("marks",)).marks[0].names == ()
 
 
 def test_points_that_were_not_given_are_not_marked():
@@ -250,7 +250,7 @@ def test_points_that_were_not_given_are_not_marked():
             seen = fa.Observation(points, AT, (500, 500))
             face = fc.measure(SUBJECT, fa.fit(MODEL, seen, distance=0.6))
         scene = composed(
-            face, replace(PICTURE, observed=points), overlays=("points", "names", "rays")
+            face, replace(PICTURE, observed=points), overlays=("marks", "names", "rays")
         )
         kept = np.delete(np.array(MODEL.scheme("egg").points), [3, 7])
         assert all(mark.names == tuple(kept) and len(mark.points) == 18 for mark in scene.marks)

@@ -50,6 +50,7 @@ class Bend(NamedTuple):
     flex: tuple[tuple[int, float], ...]
     flex_at: str
     draw: int | None
+    extreme: int | None  # goes before a draw, and both before flex: each stands for the whole face
 
 
 class Look(NamedTuple):
@@ -95,12 +96,15 @@ class ViewState(
     flex: tuple[tuple[int, float], ...] = ()  # (mode from 1, mm of mean surface change)
     flex_at: str = "reprojection"
     draw: int | None = None
+    extreme: int | None = None
+    flex_from: int = 1  # the first of the modes that have sliders
     show: str = "both"
     surface: str = "skin"
     view: str = "three_quarter"
     orbit: tuple[float, float] | None = None  # degrees: azimuth, elevation
     zoom: float = 1.0
-    overlays: tuple[str, ...] = ("points", "ghost", "scale")
+    # Neither ghost nor marks at first: the one patches the fitted face, the others hide its eyes and mouth
+    overlays: tuple[str, ...] = ("points", "scale")
     error_scale: int = 1
     fade: float = 0.5
     hide: tuple[str, ...] = ()

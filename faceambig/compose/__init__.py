@@ -143,8 +143,9 @@ def compose(
         one place, in turn; "difference", side by side, the fitted head coloured by it.
     surface: "skin" or "clay"; or of the fitted head "difference" (d_S per vertex, mm), "depth" (`depth_change_mm`) or
         "spread" (`spread_mm` (N,), posterior sd). `shown_surface` says which is drawn, for `legend_words`: title, note.
-    overlays: of OVERLAYS. The ghost is left out where the fitted head's colours are values; rays and pyramid are in
-        the room of the heads, so not in the view "camera".
+    overlays: of OVERLAYS; "points" are those on the photograph, "marks" the same on the heads. The ghost is left out
+        where the fitted head's colours are values; rays and pyramid are in the room of the heads, so not in the view
+        "camera".
     error_scale: 1, 5, 10 or 20 times the gap from cross to circle, of the overlay "errors".
     hide: of HIDEABLE: "numbers" their text, "truth" the true head and every difference to it, "actual" the distance
         the photograph was taken from.
@@ -274,7 +275,7 @@ def _picture(picture: Photo, face: Face, look: Look, error_scale: float) -> Phot
 
 
 def _marks(subject: Subject, face: Face, look: Look) -> tuple[Marks, ...]:
-    if "points" not in look.overlays or look.view == "camera":
+    if "marks" not in look.overlays or look.view == "camera":
         return ()
     both = marks(subject, face, names="names" in look.overlays)
     return both[1:] if "truth" in look.hide else both
@@ -292,7 +293,7 @@ def _cameras(face: Face, look: Look) -> tuple[tuple[str, Station], ...]:
 
 def _lines(subject: Subject, face: Face, look: Look, picture: Photo) -> Iterable[Lines]:
     """Rays cut to what is shown: from a drawn camera on, else from where the picture ends; and the cameras."""
-    at = face.fit.observation.vertices(subject.model)
+    at = face.observation.vertices(subject.model)
     for name, place in _cameras(face, look):
         vertices, tone = (subject.vertices, "seen") if name == "true" else (face.vertices, "d_l")
         if "rays" in look.overlays:

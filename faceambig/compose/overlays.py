@@ -17,7 +17,7 @@ from ..model import FaceModel, Subject
 from ..scene import Lines, Marks, Photo
 from .face import Face, centre_of
 
-OVERLAYS = ("points", "names", "errors", "rays", "pyramid", "ghost", "scale", "outline")
+OVERLAYS = ("points", "marks", "names", "errors", "rays", "pyramid", "ghost", "scale", "outline")
 LIFT = 1.5e-3  # metres above the surface: else a mark's own triangle hides half of it
 FARTHEST = 0.6  # metres from the head: a camera beyond is drawn here, with a break mark
 PYRAMID = 0.08  # metres from the camera to the photograph in front of it
@@ -52,7 +52,7 @@ def station(
 
 def marks(subject: Subject, face: Face, *, names: bool) -> tuple[Marks, Marks]:
     """The landmarks given in the photograph, on the true head and on the fitted one, a little above the surface."""
-    model, observation = subject.model, face.fit.observation
+    model, observation = subject.model, face.observation
     seen = np.isfinite(observation.points.sum(axis=1))
     at = observation.vertices(model)[seen]
     words: tuple[str, ...] = ()
