@@ -56,7 +56,15 @@ def panel_of(state: ViewState) -> tuple[Panel, Gui, list[Change], list[str]]:
     gui, told, acts = Gui(), [], []
     made: Any = gui  # a stand-in
     made.main_panel = MagicMock()
-    panel = Panel(made, {1: "a", 2: "b", 3: "c"}, told.append, acts.append, narrow=True)
+    panel = Panel(
+        made,
+        {1: "a", 2: "b", 3: "c"},
+        told.append,
+        acts.append,
+        narrow=True,
+        own=MagicMock(),
+        use_hint=lambda: None,
+    )
     panel.show(state)
     return panel, gui, told, acts
 
