@@ -298,8 +298,8 @@ class Browser:
         at, scene = self.panel.places, shown.scene
         cards, marks = own_page.cards(own, scene, state.hide), own_page.marks(own, scene)
         html: Contents = [(at.crosses, "")]
-        if self.stage.narrow:
-            html.append((at.marks, figures.side_by_side(marks, cards)))
+        if self.stage.narrow:  # one below the other: a finger needs a large photograph
+            html.append((at.marks, marks + cards))
         else:
             html += [(at.cards, cards), (at.marks, marks)]
         taken = None if own is None else own.taken

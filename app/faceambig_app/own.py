@@ -33,7 +33,7 @@ from faceambig.compose import (
 )
 from faceambig.flex import FlexibilityModes, plausible_limit
 from faceambig.io.landmarks import parse_landmarks
-from faceambig.io.pictures import decode_picture
+from faceambig.io.pictures import WEB_FORMATS, decode_picture
 from faceambig.model import FaceModel, Subject
 from faceambig.observation import FLATTEST, MIN_POINTS
 from faceambig.scene import Curves, Numbers, Photo, Scene
@@ -46,11 +46,14 @@ from .text import centimetres, percent_number, say
 REFERENCE = 0.6  # metres: of the fit that stands in for the true face
 LARGEST = 1600  # pixels of the longer side that are kept: 7.7 MB; a face is found and coloured in them as well
 MAX_PIXELS = 40_000_000
-FORMATS = ("PNG", "JPEG", "WEBP")
 QUALITY = 85  # of the JPEG on the page
-ROOM = (
-    0.45  # of the width of the points, left on each side where the photograph shows the face alone
-)
+# Points of Farkas that are asked for, by the name of their words: twelve, and what may follow
+TWELVE = (
+    "ex_r", "en_r", "en_l", "ex_l", "prn", "al_r", "al_l", "ch_r", "ch_l", "gn", "t_r", "t_l",
+)  # fmt: skip
+MORE = ("p_r", "p_l", "se", "sn", "ls", "li", "sba_r", "sba_l")
+NAMED = (*TWELVE, *MORE)
+ROOM = 0.45  # of the extent of the points, left on each side of the face in its part of the photo
 
 _T = TypeVar("_T")
 _decoding = threading.Lock()  # 40 megapixels take up to 0.5 GB on the way: one at a time
@@ -101,7 +104,7 @@ def read_photo(name: str, data: bytes) -> OwnPhoto:
 
     try:
         with _decoding:
-            picture = decode_picture(data, name=name, formats=FORMATS, max_pixels=MAX_PIXELS)
+            picture = decode_picture(data, name=name, formats=WEB_FORMATS, max_pixels=MAX_PIXELS)
             width, height = picture.size
             scale = min(1.0, LARGEST / max(width, height))
             rgb = picture.rgb
@@ -330,7 +333,7 @@ def _scene(
     if surface == "spread":
         raise ValueError(say("own.no_spread"))
     fit = _fit(own, state, state.fitting._replace(distance=REFERENCE))
-    return compose(
+    scene = compose(
         subject,
         face,
         photo_of_fit(face.fit, own.taken.size, caption=say("own.caption")),
@@ -341,7 +344,7 @@ def _scene(
         show=state.show,
         fade=state.fade,
         surface=state.surface,
-        overlays=state.overlays,
+        overlays=[name for name in state.overlays if name != "ghost"],  # of a true face
         error_scale=float(state.error_scale),
         hide=hide,
         true_camera=fit.camera,
@@ -349,6 +352,16 @@ def _scene(
         curve=plot,
         legend_words=(say("own.legend"), say("legend.unmeasured")),
         note=say("own.note"),
+    )
+    return replace(scene, photo=_told(own, scene.photo))
+
+
+def _told(own: OwnPhoto, picture: Photo) -> Photo:
+    """The photograph with circles only where there are crosses, and its points by the names that were asked for."""
+    return replace(
+        picture,
+        projected=np.where(np.isfinite(own.points), picture.projected, np.nan),
+        names=tuple(say(f"point.{name}") if name in NAMED else name for name in own.names),
     )
 
 
@@ -368,7 +381,8 @@ def _row(own: OwnPhoto, state: ViewState, subject: Subject) -> Scene:
         titles=[say("own.head"), *titles], captions=[(), *captions],
         legend_words=(say("own.legend"), say("legend.unmeasured")), note=say("own.note"),
     )  # fmt: skip
-    return replace(scene, numbers=replace(scene.numbers, reference=say("own.reference")))
+    numbers = replace(scene.numbers, reference=say("own.reference"))
+    return replace(scene, numbers=numbers, photo=_told(own, scene.photo))
 
 
 def _average(own: OwnPhoto | None, state: ViewState) -> Scene:
@@ -385,7 +399,8 @@ def _average(own: OwnPhoto | None, state: ViewState) -> Scene:
         heads=(head(faces, "fit", say("own.average"), faces.mean, clay, slot=0.0),),
         views=(named_view(view, orbit=state.orbit or (0.0, 0.0), zoom=state.zoom),),
         photo=Photo(
-            *size, observed=points, projected=np.full(points.shape, np.nan), names=names,
+            *size, observed=points, projected=np.full(points.shape, np.nan),
+            names=tuple(say(f"point.{name}") if name in NAMED else name for name in names),
             caption="" if own is None else say("own.caption"), vertices=faces.mean, faces=faces.faces, colours=clay,
             occlusion=None, focal=1.0, principal=(0.5 * size[0], 0.5 * size[1]),
         ),

@@ -19,7 +19,7 @@ def heading(own: OwnPhoto | None, state: ViewState) -> str:
     """The first words."""
     words = problem(own)
     if words:
-        lines = [words, say("own.start")] if own is not None else [words]
+        lines = [words if own is None else say("own.start")]
     else:
         assumed = None if state.camera == "orthographic" else state.distance
         points = 0 if own is None else own.placed
@@ -29,10 +29,10 @@ def heading(own: OwnPhoto | None, state: ViewState) -> str:
 
 
 def marks(own: OwnPhoto | None, scene: Scene) -> str:
-    """The photograph and the points that a hand can move on it."""
+    """The photograph and the points that a hand can move on it; above it, the point that is asked for."""
     if own is None:
         return ""
-    return photograph.photo_marks(
+    return placing.asked_words(own) + photograph.photo_marks(
         scene.photo, draggable=True, place=bool(own.asked), part=own.part, hover=False
     )
 
@@ -68,7 +68,7 @@ def shown(own: OwnPhoto | None, status: str, *, can_undo: bool, hint: float | No
         status = problem(own)
     return Shown(
         photo=True,
-        asked=placing.asked_words(own),
+        asked=bool(own.asked),
         status=status,
         more=bool(placing.left(own)),
         undo=can_undo,

@@ -80,13 +80,11 @@ def photo_marks(
 def _cut(photo: Photo, part: tuple[float, float, float, float]) -> str:
     """The style by which the background shows a part of the picture alone."""
     x, y, width, height = part
+    sizes = 100 * photo.width / width, 100 * photo.height / height
     # A position in percent puts this share of the picture on this share of the box
-    across = 100 * x / max(photo.width - width, 1e-9)
-    along = 100 * y / max(photo.height - height, 1e-9)
-    return (
-        f";background-size:{100 * photo.width / width:.4f}% {100 * photo.height / height:.4f}%"
-        f";background-position:{across:.4f}% {along:.4f}%"
-    )
+    places = 100 * x / max(photo.width - width, 1e-9), 100 * y / max(photo.height - height, 1e-9)
+    size, place = (" ".join(f"{share:.4f}%" for share in pair) for pair in (sizes, places))
+    return f";background-size:{size};background-position:{place}"
 
 
 def gaps_mm(photo: Photo, landmarks: IntArray | None = None) -> Array:

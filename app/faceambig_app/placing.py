@@ -6,16 +6,14 @@ from html import escape
 
 from faceambig.model import FaceModel
 
-from .own import OwnPhoto, moved, on_scheme, with_points
+from .own import NAMED, TWELVE, OwnPhoto, moved, on_scheme, with_points
 from .text import say
 
 SCHEME = "farkas"
 # x, y in the drawing of 100 x 120. The subject's right is on the left: r and l are the subject's sides
-TWELVE = {
+SPOTS = {
     "ex_r": (25, 51), "en_r": (40, 52), "en_l": (60, 52), "ex_l": (75, 51), "prn": (50, 71), "al_r": (42, 75),
     "al_l": (58, 75), "ch_r": (37, 90), "ch_l": (63, 90), "gn": (50, 113), "t_r": (11, 60), "t_l": (89, 60),
-}  # fmt: skip
-MORE = {
     "p_r": (32.5, 51), "p_l": (67.5, 51), "se": (50, 49), "sn": (50, 78), "ls": (50, 87), "li": (50, 95),
     "sba_r": (11, 72), "sba_l": (89, 72),
 }  # fmt: skip
@@ -31,12 +29,12 @@ _LINES = (
 
 def begin(own: OwnPhoto, faces: FaceModel) -> OwnPhoto:
     """The photograph without points, the twelve to be asked."""
-    return on_scheme(own, faces, SCHEME, asked=tuple(TWELVE), words="")
+    return on_scheme(own, faces, SCHEME, asked=TWELVE, words="")
 
 
 def more(own: OwnPhoto) -> OwnPhoto:
     """The photograph with the optional points to be asked."""
-    return with_points(own, own.points, asked=tuple(name for name in left(own)))
+    return with_points(own, own.points, asked=tuple(left(own)))
 
 
 def left(own: OwnPhoto) -> list[str]:
@@ -44,7 +42,7 @@ def left(own: OwnPhoto) -> list[str]:
     if own.scheme != SCHEME or own.asked:
         return []
     row = {name: k for k, name in enumerate(own.names)}
-    wanted = [name for name in (*TWELVE, *MORE) if name in row]
+    wanted = [name for name in NAMED if name in row]
     return [name for name in wanted if own.points[row[name]][0] != own.points[row[name]][0]]  # NaN
 
 
@@ -75,7 +73,7 @@ def _drawing(own: OwnPhoto) -> str:
     """A face with the points placed small, and the one asked for large."""
     row = {name: k for k, name in enumerate(own.names)}
     spots = []
-    for name, (x, y) in (TWELVE | MORE).items():
+    for name, (x, y) in SPOTS.items():
         if name == own.asked[0]:
             spots.append(
                 f'<circle cx="{x}" cy="{y}" r="8" fill="none" stroke="var(--fa-seen)" stroke-width="2.5"/>'

@@ -83,7 +83,9 @@ class Page:
 def refusal(control: Any, asked: object, put: object) -> str:
     """The notice for a value a control may not have."""
     if isinstance(control, viser.GuiUploadButtonHandle):
-        return say("own.points_large" if control.mime_type == POINTS else "own.unreadable")
+        if control.mime_type == POINTS:
+            return say("own.points_large")
+        return say("own.unreadable")
     low, high = getattr(control, "min", None), getattr(control, "max", None)
     if (
         isinstance(asked, (int, float))

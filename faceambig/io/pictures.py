@@ -30,6 +30,7 @@ MAX_PIXELS = (
 )
 # Pixels are decoded of these; of TIFF only the size is read: libtiff reports damage to stderr by itself
 FORMATS = ("JPEG", "PNG", "WEBP", "BMP")
+WEB_FORMATS = ("JPEG", "PNG", "WEBP")  # of them, what people have on a telephone
 NAMED = "JPEG, PNG, WebP and BMP are accepted"
 # First bytes of pictures; those that are not accepted are still told apart from landmarks
 STARTS = (b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n", b"BM", b"II*\x00", b"MM\x00*", b"GIF8")

@@ -22,7 +22,7 @@ class Widget:
     def on_update(self, listener: Any) -> None:
         self.listener = listener
 
-    on_click = on_update
+    on_click = on_upload = on_update
 
     def add_tab(self, label: str) -> Widget:
         return Widget(label)

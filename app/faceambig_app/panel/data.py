@@ -13,10 +13,11 @@ from ..guard import add_upload
 from ..text import centimetres, say
 from .widgets import Widgets
 
-PICTURES = "image/png,image/jpeg,image/webp"
+PICTURES = ",".join(f"image/{kind}" for kind in ("png", "jpeg", "webp"))
 Button = viser.GuiButtonHandle | viser.GuiButtonGroupHandle | viser.GuiUploadButtonHandle
 
-POINTS = ".pts,.csv,.txt,.json"
+POINTS = ",".join((".pts", ".csv", ".txt", ".json"))
+HERE = "\0"  # where an element stands in words
 
 
 class Does(Protocol):
@@ -37,7 +38,7 @@ class Shown(NamedTuple):
     """What the tab shows."""
 
     photo: bool  # whether there is one
-    asked: str = ""  # HTML: the point to be placed
+    asked: bool = False  # whether a point is to be placed
     status: str = ""  # in words: what was done, what is missing
     more: bool = False  # whether further points could be placed
     undo: bool = False  # whether there is a step to take back
@@ -48,7 +49,6 @@ class Shown(NamedTuple):
 class Data:
     """The widgets of the tab."""
 
-    asked: viser.GuiHtmlHandle
     status: viser.GuiHtmlHandle
     hint: viser.GuiButtonHandle
     of_photo: tuple[Button, ...]  # seen while there is a photograph
@@ -58,13 +58,12 @@ class Data:
 
     def show(self, shown: Shown) -> None:
         """Write what is; on the event loop only."""
-        self.asked.content = shown.asked
         lines = shown.status or ("" if shown.photo else say("own.none"))
         self.status.content = f'<div class="fa"><p>{escape(lines)}</p></div>' if lines else ""
         for handle in self.of_photo:
             handle.visible = shown.photo
         for handle in self.of_asked:
-            handle.visible = bool(shown.asked)
+            handle.visible = shown.asked
         self.more.visible, self.undo.visible = shown.more, shown.undo
         self.hint.visible = shown.hint is not None
         if shown.hint is not None:
@@ -74,10 +73,10 @@ class Data:
 def build(w: Widgets, does: Does, use_hint: Callable[[], None]) -> Data:
     """The tab. The words on what becomes of a photograph stand before the button that sends it."""
     host = f"<span data-fa-host>{escape(say('own.host'))}</span>"
-    privacy = escape(say("own.privacy", host="{host}")).replace("{host}", host)
+    privacy = escape(say("own.privacy", host=HERE)).replace(HERE, host)
     w.gui.add_html(f'<div class="fa"><p>{privacy}</p></div>')
     add_upload(w.gui, say("own.photo"), PICTURES, does.take, hint=say("own.photo_hint"))
-    status, asked = w.gui.add_html(""), w.gui.add_html("")
+    status = w.gui.add_html("")
     skip = _button(w, "skip", does.skip)
     find, begin = _button(w, "find", does.find), _button(w, "begin", does.begin)
     more = _button(w, "more", does.more)
@@ -95,7 +94,7 @@ def build(w: Widgets, does: Does, use_hint: Callable[[], None]) -> Data:
     part.on_click(cut)
     hint = _button(w, "hint", use_hint)
     remove = _button(w, "remove", does.remove)
-    data = Data(asked, status, hint, (find, begin, points, part, remove), (skip,), more, undo)
+    data = Data(status, hint, (find, begin, points, part, remove), (skip,), more, undo)
     data.show(Shown(photo=False))
     return data
 
