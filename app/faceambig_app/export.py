@@ -24,7 +24,7 @@ from faceambig.io.meshes import Mesh, encode_glb, encode_obj, encode_ply
 from faceambig.io.pictures import DIAGONAL_35MM
 from faceambig.scene import Curves, Scene
 
-from . import pipeline
+from . import faces, fits, likely, pipeline
 from .forms import to_json
 from .provenance import file_name, notes, provenance, shown
 from .state import DEFAULT, Fitting, Target, ViewState, changed
@@ -143,7 +143,7 @@ def measured(state: ViewState) -> dict[str, Any]:
     The curves and the interval are those of the unbent face, as on the page. None: far away, or not applicable.
     """
     state = changed(state, show="both")
-    face = pipeline.face(state.target, state.fitting, state.bend)
+    face = faces.face(state.target, state.fitting, state.bend)
     fit, origin = face.fit, provenance(state)
     return {
         "format": "faceambig-numbers",
@@ -152,7 +152,7 @@ def measured(state: ViewState) -> dict[str, Any]:
         "model": origin["Model"],
         "licence": origin["Licence"],
         "state": json.loads(to_json(state)),
-        "subject": pipeline.photograph(state.target).subject.name,
+        "subject": fits.photograph(state.target).subject.name,
         "actual_m": state.actual,
         "camera": state.camera,
         "distance_m": fit.distance,
@@ -177,7 +177,7 @@ def _alpha(state: ViewState, face: Face) -> np.ndarray:
     if not state.flex:
         return face.fit.alpha
     last = max(mode for mode, _ in state.flex)
-    modes = pipeline.bending(state.target, state.fitting, state.flex_at, last)
+    modes = likely.bending(state.target, state.fitting, state.flex_at, last)
     return face.fit.alpha + sum(mm * modes.directions[mode - 1] for mode, mm in state.flex)
 
 
@@ -217,7 +217,7 @@ def _along_distance(state: ViewState) -> dict[str, Any]:
 @lru_cache(maxsize=16)
 def swept(target: Target, fitting: Fitting) -> tuple[fa.Sweep, Curves]:
     """The sweep behind a target's curves, and the curves; asked as `pipeline.curve` asks, so the numbers are its."""
-    taken = pipeline.photograph(target)
+    taken = fits.photograph(target)
     sweep = fa.sweep_distance(
         taken.subject.model,
         taken.observation,

@@ -26,7 +26,7 @@ from faceambig.compose import (
 )
 from faceambig.scene import Scene
 
-from . import pipeline, trackplots
+from . import fits, pipeline, trackplots
 from .packing import directions, packed, rounded, step_of
 from .provenance import file_name, shown, who
 from .standalone import CIRCLE, html
@@ -101,7 +101,7 @@ def tracks_of(state: ViewState, whats: Sequence[str]) -> list[Track]:
 
 def contents(state: ViewState, scene: Scene, tracks: Sequence[Track]) -> tuple[dict[str, Any], str]:
     """Numbers, words and places as JSON can hold them; and the geometry as text."""
-    taken = pipeline.photograph(state.target)
+    taken = fits.photograph(state.target)
     subject, face_model = taken.subject, taken.subject.model
     first = tracks[0].faces[0].vertices
     step = step_of(subject.vertices, *(face.vertices for track in tracks for face in track.faces))

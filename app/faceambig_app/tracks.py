@@ -16,7 +16,8 @@ from faceambig.arrays import Array
 from faceambig.compose import Face
 from faceambig.scene import Scene
 
-from . import pipeline
+from . import likely, pipeline
+from .faces import face
 from .state import FIELDS, ViewState, changed
 from .text import NARROW, centimetres, say
 
@@ -57,7 +58,7 @@ def distances(low: float, high: float, count: int, through: Sequence[float] = ()
 def distance_track(state: ViewState, metres: Array) -> Track:
     """The fits that assume `metres` (F,), ascending; of the far-away camera's state too."""
     target, fitting = state.target, state.fitting
-    faces = [pipeline.face(target, fitting._replace(distance=float(d)), state.bend) for d in metres]
+    faces = [face(target, fitting._replace(distance=float(d)), state.bend) for d in metres]
     return Track(0, metres, tuple(faces))
 
 
@@ -66,8 +67,8 @@ def mode_track(state: ViewState, mode: int, millimetres: Array) -> Track:
     if not 1 <= mode <= MODES:
         raise ValueError(f"mode: {mode} is not within 1 to {MODES}")
     states = [bent(state, mode, float(mm)) for mm in millimetres]
-    faces = [pipeline.face(one.target, one.fitting, one.bend) for one in states]
-    modes = pipeline.bending(state.target, state.fitting, state.flex_at, MODES)
+    faces = [face(one.target, one.fitting, one.bend) for one in states]
+    modes = likely.bending(state.target, state.fitting, state.flex_at, MODES)
     return Track(mode, millimetres, tuple(faces), modes.words[mode - 1])
 
 

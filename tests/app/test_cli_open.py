@@ -20,7 +20,7 @@ import faceambig as fa
 from commands import RECORD, printed, refused, write_pts
 from faceambig.io.fits import encode_fit
 from faceambig.metrics import surface_difference
-from faceambig_app import photo, pipeline, sheets
+from faceambig_app import photo, sheets
 from faceambig_app.commands import progress
 from scenes import need_renderer
 
@@ -634,5 +634,5 @@ def test_files_taken_one_after_the_other_are_written_together_or_not_at_all(tmp_
         assert not (tmp_path / "a").exists()  # not before all are there
         yield tmp_path / "b", b"2"
 
-    pipeline.write_pairs(files())
+    write_pairs(files())
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {"a": b"1", "b": b"2"}

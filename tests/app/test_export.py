@@ -18,7 +18,7 @@ import pytest
 from faceambig.arrays import vertex_normals
 from faceambig.compose import skin
 from faceambig.io.meshes import linear
-from faceambig_app import export, heads, pipeline, player, stage, standalone, tracks
+from faceambig_app import export, faces, fits, heads, pipeline, player, stage, standalone, tracks
 from faceambig_app.forms import from_json, to_json
 from faceambig_app.packing import TOLERANCE_MM, directions, packed, restored, rounded, step_of
 from faceambig_app.state import ViewState, changed
@@ -75,11 +75,11 @@ def test_meshes_come_back_in_metres_and_in_the_colours_shown(face):
 def test_fit_and_true_face_are_two_faces_and_the_difference_is_a_colour():
     own, truth = (read_ply(export.files(STATE, "ply", face=face)[1]) for face in ("fit", "true"))
     gaps = 1e3 * np.linalg.norm(own[1] - truth[1], axis=1)
-    evaluation = pipeline.model("embedded").evaluation
-    shown = pipeline.face(STATE.target, STATE.fitting, STATE.bend)
+    evaluation = fits.model("embedded").evaluation
+    shown = faces.face(STATE.target, STATE.fitting, STATE.bend)
     assert gaps[evaluation].mean() == pytest.approx(shown.d_s_mm, abs=1e-3)  # aligned, so d_S
     plain = read_ply(export.files(changed(STATE, surface="skin", flex=()), "ply")[1])[2]
-    subject = pipeline.photograph(STATE.target).subject
+    subject = fits.photograph(STATE.target).subject
     np.testing.assert_array_equal(plain, skin(subject))
     assert (own[2] != plain).any()
 
@@ -107,7 +107,7 @@ def test_the_state_comes_back():
 
 def test_numbers_are_those_of_the_pipeline():
     record = json.loads(export.files(STATE, "json")[1])
-    face = pipeline.face(STATE.target, STATE.fitting, STATE.bend)
+    face = faces.face(STATE.target, STATE.fitting, STATE.bend)
     fit = face.fit
     assert record["d_l_percent"] == face.d_l_percent
     assert record["d_s_mm"] == face.d_s_mm
@@ -116,7 +116,7 @@ def test_numbers_are_those_of_the_pipeline():
     np.testing.assert_allclose(  # the bend is in it
         fit.model.vertices(record["alpha"]), face.own_vertices, atol=1e-12
     )
-    curve = pipeline.curve_of(STATE)
+    curve = pipeline.plots_of(STATE)
     curves = record["curves"]
     np.testing.assert_array_equal(curves["distance_m"][:-1], curve.distances)
     assert curves["distance_m"][-1] is None
@@ -128,7 +128,7 @@ def test_numbers_are_those_of_the_pipeline():
 
 def test_the_equivalent_lens_sees_the_same_diagonal():
     record = json.loads(export.files(STATE, "json")[1])
-    size = pipeline.photograph(STATE.target).observation.image_size
+    size = fits.photograph(STATE.target).observation.image_size
     assert size is not None
     width, height = size
     film = 2 * np.arctan(np.hypot(36, 24) / 2 / record["focal_35mm"])
@@ -304,13 +304,11 @@ def test_faces_of_the_page_are_those_of_the_pipeline(html):
     weights, parts = np.array(track["weights"]), arrays["distance_parts"].astype(float)
     flat = weights @ parts.reshape(weights.shape[1], -1)
     shown = data["step"] * (flat.reshape(len(flat), 3, -1) + arrays["base"])
-    truth = pipeline.photograph(state.target).subject.vertices
+    truth = fits.photograph(state.target).subject.vertices
     assert {0.2, 0.3, 0.6, 1.2, 2.4, 3.0} <= set(way.places.tolist())
     for stop, face in enumerate(way.faces):
         assert (
-            pipeline.face(
-                state.target, state.fitting._replace(distance=way.places[stop]), state.bend
-            )
+            faces.face(state.target, state.fitting._replace(distance=way.places[stop]), state.bend)
             is face
         )
         gap = 1e3 * np.linalg.norm(shown[stop].T - face.vertices, axis=1)
@@ -319,7 +317,7 @@ def test_faces_of_the_page_are_those_of_the_pipeline(html):
         assert np.abs(points - face.projected).max() < 0.02  # pixels of 500
     gap = 1e3 * np.linalg.norm(data["step"] * arrays["truth"].T - truth, axis=1)
     assert gap.max() < TOLERANCE_MM
-    np.testing.assert_array_equal(arrays["faces"].T, pipeline.model("embedded").faces)
+    np.testing.assert_array_equal(arrays["faces"].T, fits.model("embedded").faces)
 
 
 def test_directions_keep_to_the_tolerance_on_wild_ways_and_large_heads():
@@ -340,7 +338,7 @@ def test_a_swing_bends_as_the_page_does():
     track = tracks.mode_track(state, 1, np.array([-2.0, 0.0, 2.0]))
     for mm, flex in ((0, ((1, -2.0), (2, 1.0))), (1, ((2, 1.0),)), (2, ((1, 2.0), (2, 1.0)))):
         one = changed(state, flex=flex)
-        assert track.faces[mm] is pipeline.face(one.target, one.fitting, one.bend)
+        assert track.faces[mm] is faces.face(one.target, one.fitting, one.bend)
     scene = tracks.scene_of(state, track, 0)
     assert scene.note.startswith(f"Mode A: {track.words}: −2\u202fmm; ")
 

@@ -14,7 +14,7 @@ import pytest
 from playwright.sync_api import Browser
 from playwright.sync_api import Page as Tab
 
-from faceambig_app import ViewState, pipeline, server
+from faceambig_app import ViewState, faces, fits, server
 
 pytestmark = pytest.mark.browser
 
@@ -116,8 +116,8 @@ def visit(browser: Browser, served: server.Page) -> Iterator[Callable[..., Visit
 
 def test_the_first_frame_teaches(visit):
     me = visit()
-    assert me.n_vertices("/true/head") == pipeline.model("embedded").n_vertices
-    assert me.n_vertices("/fit/head") == pipeline.model("embedded").n_vertices
+    assert me.n_vertices("/true/head") == fits.model("embedded").n_vertices
+    assert me.n_vertices("/fit/head") == fits.model("embedded").n_vertices
     assert np.abs(me.mesh("/true/head") - me.mesh("/fit/head")).max() > 1e-3  # another face
     d_l, d_s = me.numbers()
     assert d_l < 1.5
@@ -168,13 +168,13 @@ def test_the_mouse_drags_the_slider_and_the_circles_stay_on_the_crosses(visit):
 def test_the_points_stay_while_the_face_changes_for_the_mean_of_ten_people(visit):
     me = visit()
     near, far = [], []
-    for number, person in enumerate(pipeline.model("embedded").subjects, start=1):
+    for number, person in enumerate(fits.model("embedded").subjects, start=1):
         me.tab.get_by_label("Person").click()
         me.tab.get_by_role("option", name=person.name, exact=True).click()
         for metres, into in ((0.3, near), (2.4, far)):
             me.type_distance(f"{100 * metres:.0f}")
             state = ViewState(subject=number, distance=metres)
-            face = pipeline.face(state.target, state.fitting, state.bend)
+            face = faces.face(state.target, state.fitting, state.bend)
             want = np.array([face.d_l_percent, face.d_s_mm])
             me.until(
                 lambda want=want: (
@@ -321,7 +321,7 @@ def test_view_buttons_say_which_is_on_and_turn_the_heads(visit):
 def test_through_the_camera_the_eyes_keep_their_distance(visit):
     me = visit()
     me.tab.get_by_role("button", name="Through camera").click()
-    corners = pipeline.model("embedded").scheme("ibug68").vertices[[36, 39, 42, 45]].tolist()
+    corners = fits.model("embedded").scheme("ibug68").vertices[[36, 39, 42, 45]].tolist()
     gaps = []
     for centimetres in ("30", "60", "120", "240"):
         me.type_distance(centimetres)
