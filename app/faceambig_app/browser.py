@@ -10,12 +10,15 @@ import time
 from asyncio import AbstractEventLoop
 from typing import cast
 
+import numpy as np
 import viser
 
+from faceambig.metrics import HUMAN_TOLERANCE_PERCENT
 from faceambig.scene import Scene
 
 from . import figures, guard, history, photograph, pipeline, plots
 from .actions import ACTIONS
+from .faces import curve_key
 from .fields import FIELDS
 from .fits import model
 from .forms import command
@@ -23,7 +26,7 @@ from .glide import Glide
 from .link import query
 from .notices import from_query
 from .panel import Change, Panel
-from .pipeline import Frame, curve_key, flex_of, frame, plots_of
+from .pipeline import Frame, frame, plots_of
 from .room import Dispatcher, Room
 from .scenes import photo_jpeg
 from .script import Copied, Dark, Hello, Key, Report, Script, Theme, is_dark
@@ -31,6 +34,7 @@ from .stage import Stage
 from .state import DEFAULT, ViewState, changed
 from .style import STYLE, text_size
 from .text import say
+from .told import SPECTRUM, Slider, flex_lines, flex_of, pins_of, sliders_of, told
 
 log = logging.getLogger("faceambig")
 
@@ -112,6 +116,11 @@ class Browser:
                 self.script.copy(command(self.room.state))
 
     def _go(self, state: ViewState) -> None:
+        before = self.room.state
+        if state.draw is not None and state.fitting != before.fitting and state.draw == before.draw:
+            state = changed(
+                state, draw=None
+            )  # a drawn face has a distance of its own: the fit moves
         self._travel(history.change(self._history, state, time.monotonic()))
 
     def _travel(self, to: history.History) -> None:
@@ -219,8 +228,20 @@ class Browser:
         # Heads first: a new target's curves cost a sweep and a posterior
         plot = plots.plots(plots_of(state), shown.scene.numbers, hide=state.hide)
         self._curves_of = curve_key(state.target, state.fitting)
-        self._send([(self.panel.places.plots, plot)])
-        self._loop.call_soon_threadsafe(self._settle, state)
+        self._send([(self.panel.places.plots, plot), *self._others(state)])
+        self._loop.call_soon_threadsafe(self._settle, state, sliders_of(state))
+
+    def _others(self, state: ViewState) -> Contents:
+        """Other faces behind the same points, and those that were kept."""
+        at, modes, pins = self.panel.places, flex_of(state), pins_of(state)
+        # One percent of landmark change; the tolerance is what a person does not see
+        reach = np.array([mode.tolerance_mm / HUMAN_TOLERANCE_PERCENT for mode in modes[:SPECTRUM]])
+        words = [mode.words for mode in modes[:SPECTRUM]]
+        return [
+            (at.flex, figures.flex_words(flex_lines(state))),
+            (at.spectrum, figures.spectrum(reach, words)),
+            (at.pins, figures.pins(pins.names, pins.words, pins.d_s_mm)),
+        ]
 
     def _send(self, html: Contents, scene: Scene | None = None, draft: bool = False) -> None:
         if self.room.left:  # while this was computed
@@ -257,19 +278,19 @@ class Browser:
 
     def _at_rest(self, state: ViewState, shown: Frame) -> Contents:
         at, scene = self.panel.places, shown.scene
-        first = flex_of(state)[0]
+        legend = "" if scene.legend is None else figures.legend(scene.legend)
         spoken = figures.spoken(scene.numbers, hide=state.hide) + figures.heads_words(scene)
         return [
-            (at.legend, "" if scene.legend is None else figures.legend(scene.legend)),
+            (at.legend, figures.told(told(state)) + legend),
             (at.spoken, spoken),
             (at.data, self.panel.spoken(state) + text_size(state.text)),
-            (at.flex, figures.flex_words(first.words, first.low, first.high)),
             (at.heading, figures.heading(scene.numbers.distance, state.actual, shown.points)),
         ]
 
-    def _settle(self, drawn: ViewState) -> None:
+    def _settle(self, drawn: ViewState, sliders: list[Slider]) -> None:
         """At rest, on the loop: what the controls show is what is, even where messages crossed on the way."""
         if not self.room.left and self.room.state == drawn:
             self.script.address(query(drawn))
+            self.panel.flex.tell(sliders)
             self.panel.show(drawn)
             guard.restate(self._client, self.panel.controls)

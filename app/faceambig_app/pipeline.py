@@ -15,18 +15,13 @@ from faceambig.arrays import Array
 from faceambig.compose import shown_surface
 from faceambig.scene import Curves, Scene
 
-from .faces import curve, curve_key, likely_curve
+from .faces import curve, likely_curve
 from .files import write
 from .fits import n_fitted
 from .forms import to_json
-from .likely import FlexMode, extremes, flex_modes, posterior, source, spread
+from .likely import source, spread
 from .scenes import scene_of
 from .state import Bend, Look, ViewState
-from .text import centimetres, say
-
-__all__ = ["Frame", "curve_key", "draft", "flex_of", "frame", "plots_of", "snapshot", "told"]
-
-SPECTRUM = 10  # flexibility modes shown as bars
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,33 +95,6 @@ def _in_store(state: ViewState, rested: ViewState | None) -> bool:
 def plots_of(state: ViewState) -> Curves:
     """The curves of a state with how likely each distance is: a sweep and a posterior a target, only at rest."""
     return likely_curve(state.target, state.fitting)
-
-
-def flex_of(state: ViewState) -> tuple[FlexMode, ...]:
-    """The flexibility modes that are shown of a state: those of its sliders and all before them, at least SPECTRUM."""
-    bent = [mode for mode, _ in state.flex]
-    count = max(SPECTRUM, state.flex_from + 2, *bent)
-    return flex_modes(state.target, state.fitting, state.flex_at, count)
-
-
-def told(state: ViewState) -> str:
-    """Which face stands for the fitted one, in words; empty where it is the fit, bent or not."""
-    if state.extreme is not None:
-        found = extremes(state.target, state.fitting)
-        return say(
-            "flex.extreme",
-            number=state.extreme,
-            tolerance=f"{found.tolerance_percent:g}",
-            reached=f"{found.faces[state.extreme - 1].rms_mm:.1f}",
-            bound=f"{found.bound_mm:.1f}",
-        )
-    if state.draw is None:
-        return ""
-    found = posterior(source(state.target, state.fitting)).interval(0.95)
-    low = centimetres(round(found.low, 2))
-    if found.high is None:
-        return say("flex.draw_open", number=state.draw + 1, low=low)
-    return say("flex.draw", number=state.draw + 1, low=low, high=centimetres(round(found.high, 2)))
 
 
 def snapshot(

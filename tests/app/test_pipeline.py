@@ -17,8 +17,9 @@ from faceambig.flex import Linearisation, plausible_limit
 from faceambig.scene import Curves
 from faceambig_app import faces, files, fits, likely, pipeline, scenes
 from faceambig_app.fields import VIEWS
-from faceambig_app.pipeline import draft, flex_of, frame
+from faceambig_app.pipeline import draft, frame
 from faceambig_app.state import DEFAULT, FIELDS, ViewState, changed
+from faceambig_app.told import flex_of
 from states import made, values
 
 STEPS = (fits, likely, faces, scenes)
