@@ -10,10 +10,8 @@ import time
 from asyncio import AbstractEventLoop
 from typing import cast
 
-import numpy as np
 import viser
 
-from faceambig.metrics import HUMAN_TOLERANCE_PERCENT
 from faceambig.scene import Scene
 
 from . import figures, guard, history, photograph, pipeline, plots
@@ -34,7 +32,7 @@ from .stage import Stage
 from .state import DEFAULT, ViewState, changed
 from .style import STYLE, text_size
 from .text import say
-from .told import SPECTRUM, Slider, flex_lines, flex_of, pins_of, sliders_of, told
+from .told import Slider, flex_lines, pins_of, sliders_of, spectrum_of, told
 
 log = logging.getLogger("faceambig")
 
@@ -231,15 +229,16 @@ class Browser:
         self._send([(self.panel.places.plots, plot), *self._others(state)])
         self._loop.call_soon_threadsafe(self._settle, state, sliders_of(state))
 
+    def _heading(self, state: ViewState, points: int) -> str:
+        actual = None if "actual" in state.hide else state.actual
+        return figures.heading(state.fitting.distance, actual, points)
+
     def _others(self, state: ViewState) -> Contents:
         """Other faces behind the same points, and those that were kept."""
-        at, modes, pins = self.panel.places, flex_of(state), pins_of(state)
-        # One percent of landmark change; the tolerance is what a person does not see
-        reach = np.array([mode.tolerance_mm / HUMAN_TOLERANCE_PERCENT for mode in modes[:SPECTRUM]])
-        words = [mode.words for mode in modes[:SPECTRUM]]
+        at, pins = self.panel.places, pins_of(state)
         return [
             (at.flex, figures.flex_words(flex_lines(state))),
-            (at.spectrum, figures.spectrum(reach, words)),
+            (at.spectrum, figures.spectrum(*spectrum_of(state))),
             (at.pins, figures.pins(pins.names, pins.words, pins.d_s_mm)),
         ]
 
@@ -284,7 +283,7 @@ class Browser:
             (at.legend, figures.told(told(state)) + legend),
             (at.spoken, spoken),
             (at.data, self.panel.spoken(state) + text_size(state.text)),
-            (at.heading, figures.heading(scene.numbers.distance, state.actual, shown.points)),
+            (at.heading, self._heading(state, shown.points)),
         ]
 
     def _settle(self, drawn: ViewState, sliders: list[Slider]) -> None:

@@ -149,8 +149,15 @@ def pin_face(pin: ViewState) -> Face:
 
 
 def pin_title(number: int, pin: ViewState) -> str:
-    """A pin's number and what was assumed: `Pin 1, 60 cm`."""
-    return say("pin.title", number=number, distance=centimetres(pin.fitting.distance))
+    """A pin's number and where its face was seen from: `Pin 1, assumed 60 cm`."""
+    return f"{say('pin.name', number=number)}, {place_words(pin)}"
+
+
+def place_words(pin: ViewState) -> str:
+    """The distance of a pin's face: the one assumed, or that of a face drawn with its own."""
+    distance = centimetres(pin_face(pin).camera.distance)
+    drawn = pin.bend.extreme is None and pin.bend.draw is not None
+    return say("pin.drawn" if drawn else "head.assumed", distance=distance)
 
 
 def _caption(shown: Face) -> tuple[tuple[str, str], ...]:

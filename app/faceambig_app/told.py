@@ -8,13 +8,13 @@ from functools import lru_cache
 import numpy as np
 
 from faceambig.arrays import Array
-from faceambig.metrics import surface_difference
+from faceambig.metrics import HUMAN_TOLERANCE_PERCENT, surface_difference
 
 from .faces import face
 from .fields import FIELDS, MODES
 from .fits import photograph
 from .likely import FlexMode, extremes, flex_modes, posterior, source
-from .scenes import fit_title
+from .scenes import fit_title, place_words
 from .state import Bend, Fitting, Look, Target, ViewState
 from .text import centimetres, percent_number, say
 
@@ -62,7 +62,7 @@ def flex_lines(state: ViewState) -> list[str]:
             words=mode.words,
             low=f"{mode.low:.1f}".replace("-", "\u2212"),
             high=f"{mode.high:.1f}",
-            tolerance=f"{mode.tolerance_mm:.1f}",
+            percent=percent_number(10.0 * HUMAN_TOLERANCE_PERCENT / mode.tolerance_mm),
         )
         for letter, mode in zip("ABC", modes[first - 1 : first + MODES - 1], strict=False)
     ]
@@ -74,19 +74,30 @@ def flex_lines(state: ViewState) -> list[str]:
 
 
 def _marks(mode: FlexMode) -> tuple[tuple[float, str], ...]:
-    """Where a slider has marks, mm; words where there is room for them."""
+    """Where a slider has marks, mm; words where there is room for them, rather at the right."""
     low, high = FIELDS["flex"].low, FIELDS["flex"].high
-    marks: list[tuple[float, str]] = [(0.0, "0")]
+    face_ends, unseen = say("flex.mark_plausible"), say("flex.mark_tolerance")
+    marks: list[tuple[float, str]] = []
     for mm, words in (
-        (mode.tolerance_mm, say("flex.mark_tolerance")),
-        (-mode.tolerance_mm, say("flex.mark_tolerance")),
-        (mode.high, say("flex.mark_plausible")),
-        (mode.low, say("flex.mark_plausible")),
+        (mode.high, face_ends),
+        (mode.tolerance_mm, unseen),
+        (-mode.tolerance_mm, unseen),
+        (mode.low, face_ends),
     ):
         if low <= mm <= high:
-            room = min(abs(mm - other) for other, _ in marks) >= MARK_ROOM
-            marks.append((round(mm, 2), words if room else ""))
+            free = all(abs(mm - other) >= MARK_ROOM for other, said in marks if said)
+            marks.append((round(mm, 2), words if free else ""))
     return tuple(sorted(marks))
+
+
+def spectrum_of(state: ViewState) -> tuple[Array, list[str]]:
+    """How far each of the first modes may bend, mm (K,), and what it moves.
+
+    As far as the points move by 1 % of the eye distance; not beyond plausible faces, where flexible modes end first.
+    """
+    modes = flex_of(state)[:SPECTRUM]
+    reach = [min(mode.tolerance_mm / HUMAN_TOLERANCE_PERCENT, mode.high) for mode in modes]
+    return np.array(reach), [mode.words for mode in modes]
 
 
 @lru_cache(maxsize=256)
@@ -114,7 +125,7 @@ def _pin_words(pin: ViewState, look: Look) -> str:
         words.append(say("head.taken", distance=centimetres(pin.actual)))
     if pin.bend.extreme is not None or pin.bend.draw is not None:
         words.append(fit_title(pin.bend))
-    words.append(say("head.assumed", distance=centimetres(pin.fitting.distance)))
+    words.append(place_words(pin))
     if "numbers" not in look.hide:
         d_l, d_s = percent_number(shown.d_l_percent), f"{shown.d_s_mm:.1f}"
         words.append(say("pin.d_l", d_l=d_l))

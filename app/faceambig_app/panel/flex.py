@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import viser
 from viser._messages import GuiSliderMark  # a slider's marks have no setter that is public
 
-from ..actions import draw_next, other_extreme, surprise
+from ..actions import draw_next, surprise
 from ..fields import FIELDS, MODES
 from ..state import ViewState, changed
 from ..text import say
@@ -39,11 +39,11 @@ class Flex:
         """Whole faces behind the same points: mixed, farthest apart, drawn."""
         does: dict[str, Callable[[], Change]] = {
             say("action.surprise"): lambda: surprise(float(self._strength.value)),
-            say("action.extremes"): lambda: other_extreme,
             say("action.draw"): lambda: draw_next,
         }
         group = w.gui.add_button_group(say("field.flex_faces"), tuple(does))
         group.on_click(w.heard(lambda option: does[option]()))
+        w.actions("flex_ends", ("extremes",))
 
     def tell(self, sliders: Sequence[tuple[str, Marks]]) -> None:
         """Label and marks (mm, words) of each slider, in the order of LETTERS; one that is missing has no mode."""
