@@ -33,10 +33,11 @@ def hidden_boxes(uuids: Iterable[str]) -> str:
 
 def heading(assumed: float | None, actual: float | None, points: int) -> str:
     """The first words of the page. actual None: where the photo was taken from is not told."""
-    asked = {"assumed": distance_text(assumed), "points": points}
-    lead = say("app.lead_hidden", **asked)
-    if actual is not None:
-        lead = say("app.lead", actual=distance_text(actual), **asked)
+    to = distance_text(assumed)
+    if actual is None:
+        lead = say("app.lead_hidden", assumed=to, points=points)
+    else:
+        lead = say("app.lead", actual=distance_text(actual), assumed=to, points=points)
     title, task = escape(say("app.heading")), escape(say("app.try"))
     return f'<div class="fa"><h1>{title}</h1><p>{escape(lead)}</p><p>{task}</p></div>'
 

@@ -8,7 +8,6 @@ from functools import lru_cache
 
 from faceambig.arrays import Array
 from faceambig.compose import (
-    LEGENDS,
     Face,
     compose,
     compose_pins,
@@ -67,10 +66,16 @@ def fit_title(bend: Bend) -> str:
 
 
 def _legend(surface: str) -> tuple[str, str]:
-    if surface not in LEGENDS:
-        return "", ""
-    note = "unmeasured" if surface == "difference" else f"{surface}_note"
-    return say(f"legend.{surface}"), say(f"legend.{note}")
+    """Title and note of the scale that a surface has."""
+    match surface:
+        case "difference":
+            return say("legend.difference"), say("legend.unmeasured")
+        case "depth":
+            return say("legend.depth"), say("legend.depth_note")
+        case "spread":
+            return say("legend.spread"), say("legend.spread_note")
+        case _:
+            return "", ""
 
 
 def _row(state: ViewState, look: Look, bend: Bend) -> Scene:
@@ -157,7 +162,9 @@ def place_words(pin: ViewState) -> str:
     """The distance of a pin's face: the one assumed, or that of a face drawn with its own."""
     distance = centimetres(pin_face(pin).camera.distance)
     drawn = pin.bend.extreme is None and pin.bend.draw is not None
-    return say("pin.drawn" if drawn else "head.assumed", distance=distance)
+    if drawn:
+        return say("pin.drawn", distance=distance)
+    return say("head.assumed", distance=distance)
 
 
 def _caption(shown: Face) -> tuple[tuple[str, str], ...]:

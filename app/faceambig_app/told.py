@@ -19,6 +19,7 @@ from .state import Bend, Fitting, Look, Target, ViewState
 from .text import centimetres, percent_number, say
 
 SPECTRUM = 10  # flexibility modes shown as bars
+LETTERS = ("A", "B", "C")  # of the sliders
 MARK_ROOM = 3.5  # mm on a slider that the words of a mark need
 
 Slider = tuple[str, tuple[tuple[float, str], ...]]  # label; marks: mm and words
@@ -46,7 +47,7 @@ def sliders_of(state: ViewState) -> list[Slider]:
     window = flex_of(state)[state.flex_from - 1 : state.flex_from + MODES - 1]
     return [
         (say("flex.slider", letter=letter, words=mode.words), _marks(mode))
-        for letter, mode in zip("ABC", window, strict=False)
+        for letter, mode in zip(LETTERS, window, strict=False)
     ]
 
 
@@ -64,7 +65,7 @@ def flex_lines(state: ViewState) -> list[str]:
             high=f"{mode.high:.1f}",
             percent=percent_number(10.0 * HUMAN_TOLERANCE_PERCENT / mode.tolerance_mm),
         )
-        for letter, mode in zip("ABC", modes[first - 1 : first + MODES - 1], strict=False)
+        for letter, mode in zip(LETTERS, modes[first - 1 : first + MODES - 1], strict=False)
     ]
     for number, mm in bent.items():
         if not first <= number < first + MODES:

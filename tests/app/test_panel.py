@@ -19,7 +19,9 @@ class Widget:
     """Keeps its listener, as viser's handles do."""
 
     def __init__(self, label: str, *_: Any, **__: Any) -> None:
-        self.label, self.value = label, None
+        self.label = label
+        self.value: Any = None
+        self.disabled, self._marks = False, ()
         self._impl = SimpleNamespace(uuid=label)
 
     def on_update(self, listener: Any) -> None:
@@ -75,7 +77,7 @@ def test_the_slider_of_mode_a_leaves_the_other_modes():
     assert slider.value == 0.0
     slider.hears(0)
     assert told[-1](changed(state, flex=[(2, 1.0)])).flex == ((2, 1.0),)
-    gui.widgets["Zero"].hears(None)
+    gui.widgets["Modes"].hears("Zero")
     zero = ACTIONS[acts[-1]].change
     assert zero is not None
     assert zero(state).flex == ()
@@ -99,7 +101,7 @@ def test_what_show_writes_is_not_heard():
 
 def test_the_window_of_sliders_follows_the_state():
     state = changed(DEFAULT, flex=[(1, 2.0), (5, -4.0)], flex_from=4)
-    panel, gui, told, acts = panel_of(state)
+    _, gui, told, acts = panel_of(state)
     b = gui.widgets["Mode B (mm)"]
     assert b.value == -4.0
     assert gui.widgets["Mode A (mm)"].value == 0.0
