@@ -84,6 +84,9 @@ function forget() {
 // After the server has drawn the photograph anew.
 const known = new WeakSet();
 function readPhoto() {
+  for (const index of moved.keys()) {
+    if (index !== drag?.index && !pointOf(index)) moved.delete(index);
+  }
   for (const point of document.querySelectorAll("[data-fa-photo] [data-fa-point]")) {
     if (known.has(point)) continue;
     known.add(point);

@@ -14,7 +14,7 @@ import queue
 import sys
 import threading
 import types
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import Future
 from functools import cache
 from typing import Any, NamedTuple, TypeVar
@@ -91,6 +91,13 @@ def viewer_rotation(view: View) -> Array:
     return np.array([right, up, towards])
 
 
+class Layer(NamedTuple):
+    """One head as a picture, and how near it is."""
+
+    rgba: NDArray[np.uint8]  # (H, W, 4), alpha not premultiplied
+    front: NDArray[np.float32]  # (H, W) metres from the head's origin to the viewer; -inf: nothing
+
+
 class Mesh(NamedTuple):
     """What the render thread is given. V vertices, F triangles, viewer axes."""
 
@@ -116,16 +123,9 @@ def render_head(
     middle: the point of the picture's middle, metres along the viewer's right and up from the head's origin. Parallel
     rays: one scale in the whole picture. marked: vertices that get a bead. NoRendererError where nothing can draw.
     """
-    layer = render_layer(head, view, width, height, pixels_per_metre, middle=middle, marked=marked)
-    return _reduced(layer.colour, layer.factor)
-
-
-class Layer(NamedTuple):
-    """One head as the frame buffer has it."""
-
-    colour: NDArray[np.uint8]  # (factor * height, factor * width, 4) premultiplied
-    depth: NDArray[np.float32]  # of the same size, growing away from the viewer; 0: nothing there
-    factor: int
+    return render_layer(
+        head, view, width, height, pixels_per_metre, middle=middle, marked=marked
+    ).rgba
 
 
 def render_layer(
@@ -137,40 +137,23 @@ def render_layer(
     *,
     middle: tuple[float, float] = (0.0, 0.0),
     marked: IntArray | None = None,
-    beads: Sequence[tuple[Array, tuple[int, int, int]]] = (),
 ) -> Layer:
-    """As `render_head`, with its depth. beads: points (M, 3) metres in the head's axes and the sRGB of their balls."""
+    """As `render_head`, with the depth of every pixel: for what stands in the same place."""
     R = viewer_rotation(view)
     points = head.vertices @ R.T
     points[:, :2] -= middle
     normals = vertex_normals(head.vertices, head.faces) @ R.T
     colours = _lit_colours(head, normals) if head.lit else _shown_colours(head, normals)
     mesh = Mesh(points, normals, head.faces, colours, head.lit)
-    radius = BEAD * height / pixels_per_metre
     if marked is not None and len(marked):
-        mesh = _with_beads(mesh, points[marked], radius, BEAD_COLOUR)
-    for at, colour in beads:
-        mesh = _with_beads(mesh, at @ R.T - (*middle, 0.0), radius, colour)
+        mesh = _with_beads(mesh, points[marked], BEAD * height / pixels_per_metre)
     factor = 2 if 4 * width * height <= LARGEST else 1
     size = (factor * width, factor * height)
     half = (width / (2 * pixels_per_metre), height / (2 * pixels_per_metre))
-    drawn = _studio().call(lambda pyrender, renderer: _frame(pyrender, renderer, mesh, half, size))
-    return Layer(*drawn, factor)
-
-
-def over_each_other(layers: Sequence[Layer], opacities: Sequence[float]) -> NDArray[np.uint8]:
-    """(height, width, 4) RGBA of layers of one size: at each sample from the farthest to the nearest, by opacity."""
-    if len(layers) == 1 and opacities[0] == 1:
-        return _reduced(layers[0].colour, layers[0].factor)
-    depth = np.stack([np.where(layer.depth > 0, layer.depth, np.inf) for layer in layers])
-    order = np.argsort(-depth, axis=0, kind="stable")
-    colours = np.stack([layer.colour for layer in layers]).astype(np.float32)
-    colours *= np.asarray(opacities, dtype=np.float32)[:, None, None, None]
-    out = np.zeros(colours.shape[1:], dtype=np.float32)
-    for rank in order:
-        over = np.take_along_axis(colours, rank[None, :, :, None], axis=0)[0]
-        out = over + out * (1.0 - over[..., 3:] / 255.0)
-    return _reduced(out, layers[0].factor)
+    large, depth = _studio().call(
+        lambda pyrender, renderer: _frame(pyrender, renderer, mesh, half, size)
+    )
+    return Layer(_reduced(large, factor), _front(depth, factor))
 
 
 def _lit_colours(head: Head, normals: Array) -> Array:
@@ -204,7 +187,7 @@ def _shown_colours(head: Head, normals: Array) -> Array:
     return head.colours / 255.0 * shade[:, None]
 
 
-def _with_beads(mesh: Mesh, at: Array, radius: float, srgb: tuple[int, int, int]) -> Mesh:
+def _with_beads(mesh: Mesh, at: Array, radius: float) -> Mesh:
     """The mesh with a ball of `radius` metres at each of `at` (M, 3): hidden where the face hides it."""
     import trimesh
 
@@ -212,7 +195,7 @@ def _with_beads(mesh: Mesh, at: Array, radius: float, srgb: tuple[int, int, int]
     shape = np.asarray(ball.vertices)
     starts = len(mesh.points) + len(shape) * np.arange(len(at))
     triangles = (starts[:, None, None] + np.asarray(ball.faces)).reshape(-1, 3).astype(np.uint32)
-    colour = np.array(srgb) / 255.0
+    colour = np.array(BEAD_COLOUR) / 255.0
     shown = srgb_to_linear(colour) if mesh.lit else colour
     return Mesh(
         np.concatenate([mesh.points, (at[:, None] + radius * shape).reshape(-1, 3)]),
@@ -228,7 +211,7 @@ def srgb_to_linear(colours: ArrayLike) -> Array:
     return np.asarray(colours, dtype=np.float64) ** 2.2
 
 
-def _reduced(large: NDArray[np.uint8] | NDArray[np.float32], factor: int) -> NDArray[np.uint8]:
+def _reduced(large: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:
     """The picture at 1/factor, averaged with premultiplied alpha: no dark seam at the outline."""
     picture = large.astype(np.float32)
     alpha = picture[..., 3:]
@@ -239,6 +222,17 @@ def _reduced(large: NDArray[np.uint8] | NDArray[np.float32], factor: int) -> NDA
         alpha = picture[..., 3:]
     colour = picture[..., :3] * (255.0 / np.maximum(alpha, 1.0))
     return np.concatenate([colour, alpha], axis=2).clip(0, 255).round().astype(np.uint8)
+
+
+def _front(depth: NDArray[np.float32], factor: int) -> NDArray[np.float32]:
+    """(H, W) metres towards the viewer of the nearest sample of each pixel, -inf where there is none."""
+    height, width = depth.shape[0] // factor, depth.shape[1] // factor
+    samples = depth.reshape(height, factor, width, factor)
+    nothing = samples == 0
+    # pyrender undoes the depth of a perspective camera; that of parallel rays is linear in the buffer
+    buffer = FAR + NEAR - 2 * NEAR * FAR / np.where(nothing, FAR, samples)
+    front = EYE - NEAR - 0.5 * (buffer + FAR - NEAR)
+    return np.where(nothing, -np.inf, front).max(axis=(1, 3)).astype(np.float32)
 
 
 def _frame(
