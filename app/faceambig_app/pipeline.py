@@ -16,10 +16,22 @@ from faceambig.compose import shown_surface
 from faceambig.scene import Curves, Scene
 
 from .faces import curve, likely_curve
+from .faces import (
+    face as face,  # the steps are handed on here: who asks for a frame asks for them too
+)
+from .files import writable as writable
 from .files import write
+from .files import write_all as write_all
+from .files import write_pairs as write_pairs
+from .fits import fitted as fitted
+from .fits import model as model
 from .fits import n_fitted
+from .fits import photograph as photograph
 from .forms import to_json
+from .likely import bending as bending
 from .likely import source, spread
+from .scenes import photo_jpeg as photo_jpeg
+from .scenes import picture as picture
 from .scenes import scene_of
 from .state import Bend, Look, ViewState
 
@@ -92,6 +104,11 @@ def _in_store(state: ViewState, rested: ViewState | None) -> bool:
     return same and rested.extreme is None and rested.draw is not None
 
 
+def curve_of(state: ViewState) -> Curves:
+    """The curves of a state's target."""
+    return curve(state.target, state.fitting)
+
+
 def plots_of(state: ViewState) -> Curves:
     """The curves of a state with how likely each distance is: a sweep and a posterior a target, only at rest."""
     return likely_curve(state.target, state.fitting)
@@ -110,10 +127,10 @@ def snapshot(
         encode_png,
     )  # pyrender and OpenCV only when a picture is asked for
 
-    picture = draw(frame(state).scene, width, height)
+    drawn = draw(frame(state).scene, width, height)
     if path is not None:
         write(
             Path(path),
-            encode_png(picture, {"Software": "faceambig", "ViewState": to_json(state)}),
+            encode_png(drawn, {"Software": "faceambig", "ViewState": to_json(state)}),
         )
-    return picture
+    return drawn
