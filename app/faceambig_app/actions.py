@@ -5,11 +5,14 @@ Rows without a change are done by the browser: they need its history, its clipbo
 
 from __future__ import annotations
 
+import math
+import random
+import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from .fields import FIELDS, PINS
+from .fields import FIELDS, MODES, PINS
 from .state import DEFAULT, ViewState, changed, short
 
 ROW_DISTANCES = (0.3, 0.6, 1.2, 2.4)  # metres, of the strip of faces
@@ -87,6 +90,42 @@ def visit(number: int) -> Callable[[ViewState], ViewState]:
     return change
 
 
+def surprise(mm: float) -> Callable[[ViewState], ViewState]:
+    """The change that mixes the three modes with sliders, `mm` long: another mixture every time, but of one state one.
+
+    Its seed is the bend that was there, so the mixture is all in the state and nothing else need be kept.
+    """
+
+    def change(state: ViewState) -> ViewState:
+        # Whatever the process: hash() of text is salted
+        rng = random.Random(zlib.crc32(repr((state.flex_from, state.flex)).encode()))  # noqa: S311 - no secret
+        mixture = [rng.gauss(0.0, 1.0) for _ in range(MODES)]
+        length = math.hypot(*mixture)
+        flex = [
+            (state.flex_from + k, round(mm * share / length, 1)) for k, share in enumerate(mixture)
+        ]
+        return changed(state, flex=flex, draw=None, extreme=None)
+
+    return change
+
+
+def next_modes(state: ViewState) -> ViewState:
+    """The state with sliders for the next three flexibility modes; after the last come the first."""
+    first = state.flex_from + MODES
+    return changed(state, flex_from=first if first + MODES - 1 <= state.modes else 1)
+
+
+def other_extreme(state: ViewState) -> ViewState:
+    """The state with one of the two faces farthest apart, then with the other."""
+    return changed(state, extreme=2 if state.extreme == 1 else 1, draw=None)
+
+
+def draw_next(state: ViewState) -> ViewState:
+    """The state with the next face drawn from the posterior."""
+    draw = 0 if state.draw is None else (state.draw + 1) % (int(FIELDS["draw"].high) + 1)
+    return changed(state, draw=draw, extreme=None)
+
+
 def _new_noise(state: ViewState) -> ViewState:
     noise = state.noise if state.noise > 0 else 1.0  # a new draw of nothing would show nothing
     return changed(state, seed=(state.seed + 1) % (int(FIELDS["seed"].high) + 1), noise=noise)
@@ -116,6 +155,10 @@ _ROWS = (
     Action("redo", "Z", "cmd/ctrl+shift"),
     Action("reset"),
     Action("unbend", change=_set(flex=(), draw=None, extreme=None)),
+    Action("next_modes", change=next_modes),
+    Action("surprise", change=surprise(5.0)),
+    Action("extremes", change=other_extreme),
+    Action("draw", change=draw_next),
     Action("new_noise", change=_new_noise),
     Action("copy_link"),
     Action("copy_command"),

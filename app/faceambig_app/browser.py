@@ -8,6 +8,7 @@ from __future__ import annotations
 import logging
 import time
 from asyncio import AbstractEventLoop
+from collections.abc import Sequence
 from typing import cast
 
 import viser
@@ -16,6 +17,7 @@ from faceambig.scene import Scene
 
 from . import figures, guard, history, own_page, photograph, pipeline, plots
 from .actions import ACTIONS
+from .faces import curve_key
 from .fields import FIELDS
 from .fits import model
 from .forms import command
@@ -26,7 +28,7 @@ from .own import OwnFrame, OwnPhoto, own_frame, told_distance
 from .own_room import OwnRoom
 from .panel import Change, Panel
 from .panel.widgets import setting
-from .pipeline import Frame, curve_key, flex_of, frame, plots_of
+from .pipeline import Frame, frame, plots_of
 from .room import Dispatcher, Room
 from .scenes import photo_jpeg
 from .script import (
@@ -46,6 +48,7 @@ from .stage import Stage
 from .state import DEFAULT, ViewState, changed
 from .style import STYLE, text_size
 from .text import say
+from .told import Slider, flex_lines, pins_of, sliders_of, spectrum_of, told
 
 log = logging.getLogger("faceambig")
 
@@ -138,6 +141,11 @@ class Browser:
                 self.script.copy(command(self.room.state))
 
     def _go(self, state: ViewState) -> None:
+        before = self.room.state
+        if state.draw is not None and state.fitting != before.fitting and state.draw == before.draw:
+            state = changed(
+                state, draw=None
+            )  # a drawn face has a distance of its own: the fit moves
         self._travel(history.change(self._history, state, time.monotonic()))
 
     def _travel(self, to: history.History) -> None:
@@ -269,15 +277,29 @@ class Browser:
         # Heads first: a new target's curves cost a sweep and a posterior
         plot = plots.plots(plots_of(state), shown.scene.numbers, hide=state.hide)
         self._curves_of = curve_key(state.target, state.fitting)
-        self._send([(self.panel.places.plots, plot)])
-        self._loop.call_soon_threadsafe(self._settle, state, None)
+        self._send([(self.panel.places.plots, plot), *self._others(state)])
+        self._loop.call_soon_threadsafe(self._settle, state, sliders_of(state), None)
 
     def _draw_own(self, state: ViewState, draft: bool) -> None:
         own = self._own.photo
         shown = own_frame(own, state, draft)
         self._send(self._own_contents(own, state, shown, draft), shown.scene, draft)
         if not draft:
-            self._loop.call_soon_threadsafe(self._settle, state, told_distance(own, state))
+            hint = told_distance(own, state)
+            self._loop.call_soon_threadsafe(self._settle, state, shown.sliders, hint)
+
+    def _heading(self, state: ViewState, points: int) -> str:
+        actual = None if "actual" in state.hide else state.actual
+        return figures.heading(state.fitting.distance, actual, points)
+
+    def _others(self, state: ViewState) -> Contents:
+        """Other faces behind the same points, and those that were kept."""
+        at, pins = self.panel.places, pins_of(state)
+        return [
+            (at.flex, figures.flex_words(flex_lines(state))),
+            (at.spectrum, figures.spectrum(*spectrum_of(state))),
+            (at.pins, figures.pins(pins.names, pins.words, pins.d_s_mm)),
+        ]
 
     def _send(self, html: Contents, scene: Scene | None = None, draft: bool = False) -> None:
         if self.room.left:  # while this was computed
@@ -331,34 +353,33 @@ class Browser:
         if not draft:
             self._curves_of = None
             words = own_page.spoken(own, scene, state.hide) + figures.heads_words(scene)
-            flex = figures.flex_words(shown.flex_words, *shown.flex_reach)
             html += [
                 (at.plots, own_page.curves(own, state, scene)),
                 (at.legend, "" if scene.legend is None else figures.legend(scene.legend)),
                 (at.spoken, words),
                 (at.data, self.panel.spoken(state) + text_size(state.text)),
-                (at.flex, flex if shown.flex_words else ""),
+                *((place, "") for place in (at.flex, at.spectrum, at.pins)),
                 (at.heading, own_page.heading(own, state)),
             ]
         return html
 
     def _at_rest(self, state: ViewState, shown: Frame) -> Contents:
         at, scene = self.panel.places, shown.scene
-        first = flex_of(state)[0]
+        legend = "" if scene.legend is None else figures.legend(scene.legend)
         spoken = figures.spoken(scene.numbers, hide=state.hide) + figures.heads_words(scene)
         return [
-            (at.legend, "" if scene.legend is None else figures.legend(scene.legend)),
+            (at.legend, figures.told(told(state)) + legend),
             (at.spoken, spoken),
             (at.data, self.panel.spoken(state) + text_size(state.text)),
-            (at.flex, figures.flex_words(first.words, first.low, first.high)),
-            (at.heading, figures.heading(scene.numbers.distance, state.actual, shown.points)),
+            (at.heading, self._heading(state, shown.points)),
         ]
 
-    def _settle(self, drawn: ViewState, hint: float | None) -> None:
+    def _settle(self, drawn: ViewState, sliders: Sequence[Slider], hint: float | None) -> None:
         """At rest, on the loop: what the controls show is what is, even where messages crossed on the way."""
         if not self.room.left and self.room.state == drawn:
             self._hint = hint
             self._show_own()
             self.script.address(query(drawn))
+            self.panel.flex.tell(sliders)
             self.panel.show(drawn)
             guard.restate(self._client, self.panel.controls)

@@ -31,11 +31,13 @@ def hidden_boxes(uuids: Iterable[str]) -> str:
     return f"<style>{selectors}{{display:none}}</style>"
 
 
-def heading(assumed: float | None, actual: float, points: int) -> str:
-    """The first words of the page."""
-    lead = say(
-        "app.lead", actual=distance_text(actual), assumed=distance_text(assumed), points=points
-    )
+def heading(assumed: float | None, actual: float | None, points: int) -> str:
+    """The first words of the page. actual None: where the photo was taken from is not told."""
+    to = distance_text(assumed)
+    if actual is None:
+        lead = say("app.lead_hidden", assumed=to, points=points)
+    else:
+        lead = say("app.lead", actual=distance_text(actual), assumed=to, points=points)
     title, task = escape(say("app.heading")), escape(say("app.try"))
     return f'<div class="fa"><h1>{title}</h1><p>{escape(lead)}</p><p>{task}</p></div>'
 
@@ -72,10 +74,27 @@ def _card(tone: str, title: str, value: str, unit: str, note: str, hint: str) ->
     )
 
 
-def flex_words(words: str, low: float, high: float) -> str:
-    """What mode A moves, and how far it stays a face."""
-    text = say("flex.words", words=words, low=f"{low:.1f}", high=f"{high:.1f}")
-    return f'<div class="fa"><small>{escape(text)}</small></div>'
+def flex_words(lines: Iterable[str]) -> str:
+    """What the flexibility modes move, and how far each stays a face: a line a mode."""
+    said = "".join(f"<p><small>{escape(line)}</small></p>" for line in lines)
+    return f'<div class="fa">{said}</div>'
+
+
+def told(words: str) -> str:
+    """Which face stands for the fitted one; nothing where it is the fit."""
+    return f'<div class="fa"><p>{escape(words)}</p></div>' if words else ""
+
+
+def pins(names: Sequence[str], words: Sequence[str], d_s_mm: Array) -> str:
+    """The faces kept, P of each, and how far they are from each other; what to do where there is none."""
+    if not names:
+        return f'<div class="fa"><p>{escape(say("pins.none"))}</p></div>'
+    rows = "".join(
+        f"<li><b>{escape(name)}</b> {escape(text)}</li>"
+        for name, text in zip(names, words, strict=True)
+    )
+    listed = f'<div class="fa"><ul class="fa-small">{rows}</ul></div>'
+    return listed + (pin_matrix(names, d_s_mm) if len(names) > 1 else "")
 
 
 def spoken(numbers: Numbers, *, hide: Collection[str] = ()) -> str:

@@ -39,10 +39,11 @@ from faceambig.observation import FLATTEST, MIN_POINTS
 from faceambig.scene import Curves, Numbers, Photo, Scene
 
 from .actions import ROW_DISTANCES
-from .fields import FIELDS
+from .fields import FIELDS, MODES
 from .fits import model
 from .state import DEFAULT, Fitting, ViewState
 from .text import centimetres, percent_number, say
+from .told import LETTERS
 
 REFERENCE = 0.6  # metres: of the fit that stands in for the true face
 LARGEST = 1600  # pixels of the longer side that are kept: 7.7 MB; a face is found and coloured in them as well
@@ -211,8 +212,9 @@ class OwnFrame:
     """What one browser shows of its own photograph."""
 
     scene: Scene
-    flex_words: str = ""  # what mode A moves; empty in a draft
-    flex_reach: tuple[float, float] = (0.0, 0.0)  # mm along mode A that give plausible faces
+    sliders: tuple[
+        tuple[str, tuple[tuple[float, str], ...]], ...
+    ] = ()  # label, marks: of the modes
 
 
 def own_frame(own: OwnPhoto | None, state: ViewState, draft: bool) -> OwnFrame:
@@ -232,8 +234,21 @@ def own_frame(own: OwnPhoto | None, state: ViewState, draft: bool) -> OwnFrame:
     scene = _scene(own, state, subject, face, None if draft else own_curves(own, state))
     if draft:
         return OwnFrame(scene)
-    modes = _modes(own, state, fitting, 1)
-    return OwnFrame(scene, modes.words[0], modes.reach(0))
+    return OwnFrame(
+        scene, _sliders(_modes(own, state, fitting, state.flex_from + MODES - 1), state.flex_from)
+    )
+
+
+def _sliders(
+    modes: FlexibilityModes, first: int
+) -> tuple[tuple[str, tuple[tuple[float, str], ...]], ...]:
+    """What the sliders of the modes from `first` on say; where plausible faces end."""
+    sliders = []
+    for letter, k in zip(LETTERS, range(first - 1, len(modes.words)), strict=False):
+        low, high = FIELDS["flex"].low, FIELDS["flex"].high
+        ends = tuple((round(mm, 2), "") for mm in modes.reach(k) if low <= mm <= high)
+        sliders.append((say("flex.slider", letter=letter, words=modes.words[k]), ends))
+    return tuple(sliders)
 
 
 def reference(own: OwnPhoto, state: ViewState, draft: bool) -> Subject:
@@ -317,7 +332,7 @@ def _modes(own: OwnPhoto, state: ViewState, fitting: Fitting, count: int) -> Fle
 
 def _face(own: OwnPhoto, state: ViewState, fitting: Fitting, subject: Subject) -> Face:
     """The fitted face, bent as the state says, measured against the reference."""
-    if state.draw is not None:
+    if state.draw is not None or state.extreme is not None:
         raise ValueError(say("own.no_draw"))
     fit = _fit(own, state, fitting)
     if not state.flex:

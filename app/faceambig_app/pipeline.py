@@ -15,18 +15,25 @@ from faceambig.arrays import Array
 from faceambig.compose import shown_surface
 from faceambig.scene import Curves, Scene
 
-from .faces import curve, curve_key, likely_curve
+from .faces import curve, likely_curve
+from .faces import (
+    face as face,  # the steps are handed on here: who asks for a frame asks for them too
+)
+from .files import writable as writable
 from .files import write
+from .files import write_all as write_all
+from .files import write_pairs as write_pairs
+from .fits import fitted as fitted
+from .fits import model as model
 from .fits import n_fitted
+from .fits import photograph as photograph
 from .forms import to_json
-from .likely import FlexMode, extremes, flex_modes, posterior, source, spread
+from .likely import bending as bending
+from .likely import source, spread
+from .scenes import photo_jpeg as photo_jpeg
+from .scenes import picture as picture
 from .scenes import scene_of
 from .state import Bend, Look, ViewState
-from .text import centimetres, say
-
-__all__ = ["Frame", "curve_key", "draft", "flex_of", "frame", "plots_of", "snapshot", "told"]
-
-SPECTRUM = 10  # flexibility modes shown as bars
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,36 +104,14 @@ def _in_store(state: ViewState, rested: ViewState | None) -> bool:
     return same and rested.extreme is None and rested.draw is not None
 
 
+def curve_of(state: ViewState) -> Curves:
+    """The curves of a state's target."""
+    return curve(state.target, state.fitting)
+
+
 def plots_of(state: ViewState) -> Curves:
     """The curves of a state with how likely each distance is: a sweep and a posterior a target, only at rest."""
     return likely_curve(state.target, state.fitting)
-
-
-def flex_of(state: ViewState) -> tuple[FlexMode, ...]:
-    """The flexibility modes that are shown of a state: those of its sliders and all before them, at least SPECTRUM."""
-    bent = [mode for mode, _ in state.flex]
-    count = max(SPECTRUM, state.flex_from + 2, *bent)
-    return flex_modes(state.target, state.fitting, state.flex_at, count)
-
-
-def told(state: ViewState) -> str:
-    """Which face stands for the fitted one, in words; empty where it is the fit, bent or not."""
-    if state.extreme is not None:
-        found = extremes(state.target, state.fitting)
-        return say(
-            "flex.extreme",
-            number=state.extreme,
-            tolerance=f"{found.tolerance_percent:g}",
-            reached=f"{found.faces[state.extreme - 1].rms_mm:.1f}",
-            bound=f"{found.bound_mm:.1f}",
-        )
-    if state.draw is None:
-        return ""
-    found = posterior(source(state.target, state.fitting)).interval(0.95)
-    low = centimetres(round(found.low, 2))
-    if found.high is None:
-        return say("flex.draw_open", number=state.draw + 1, low=low)
-    return say("flex.draw", number=state.draw + 1, low=low, high=centimetres(round(found.high, 2)))
 
 
 def snapshot(
@@ -142,10 +127,10 @@ def snapshot(
         encode_png,
     )  # pyrender and OpenCV only when a picture is asked for
 
-    picture = draw(frame(state).scene, width, height)
+    drawn = draw(frame(state).scene, width, height)
     if path is not None:
         write(
             Path(path),
-            encode_png(picture, {"Software": "faceambig", "ViewState": to_json(state)}),
+            encode_png(drawn, {"Software": "faceambig", "ViewState": to_json(state)}),
         )
-    return picture
+    return drawn

@@ -8,7 +8,6 @@ from functools import lru_cache
 
 from faceambig.arrays import Array
 from faceambig.compose import (
-    LEGENDS,
     Face,
     compose,
     compose_pins,
@@ -67,10 +66,16 @@ def fit_title(bend: Bend) -> str:
 
 
 def _legend(surface: str) -> tuple[str, str]:
-    if surface not in LEGENDS:
-        return "", ""
-    note = "unmeasured" if surface == "difference" else f"{surface}_note"
-    return say(f"legend.{surface}"), say(f"legend.{note}")
+    """Title and note of the scale that a surface has."""
+    match surface:
+        case "difference":
+            return say("legend.difference"), say("legend.unmeasured")
+        case "depth":
+            return say("legend.depth"), say("legend.depth_note")
+        case "spread":
+            return say("legend.spread"), say("legend.spread_note")
+        case _:
+            return "", ""
 
 
 def _row(state: ViewState, look: Look, bend: Bend) -> Scene:
@@ -149,8 +154,17 @@ def pin_face(pin: ViewState) -> Face:
 
 
 def pin_title(number: int, pin: ViewState) -> str:
-    """A pin's number and what was assumed: `Pin 1, 60 cm`."""
-    return say("pin.title", number=number, distance=centimetres(pin.fitting.distance))
+    """A pin's number and where its face was seen from: `Pin 1, assumed 60 cm`."""
+    return f"{say('pin.name', number=number)}, {place_words(pin)}"
+
+
+def place_words(pin: ViewState) -> str:
+    """The distance of a pin's face: the one assumed, or that of a face drawn with its own."""
+    distance = centimetres(pin_face(pin).camera.distance)
+    drawn = pin.bend.extreme is None and pin.bend.draw is not None
+    if drawn:
+        return say("pin.drawn", distance=distance)
+    return say("head.assumed", distance=distance)
 
 
 def _caption(shown: Face) -> tuple[tuple[str, str], ...]:

@@ -339,6 +339,8 @@ WRITTEN: dict[str, tuple[str, dict[str, Any]]] = {
     "flex": ("-3.5", {"flex": ((1, -3.5),)}),
     "flex_at": ("dlt", {"flex_at": "dlt"}),
     "draw": ("0", {"draw": 0}),
+    "extreme": ("2", {"extreme": 2}),
+    "flex_from": ("4", {"flex_from": 4}),
     "show": ("row", {"show": "row"}),
     "surface": ("spread", {"surface": "spread"}),
     "view": ("side", {"view": "side"}),

@@ -54,7 +54,7 @@ PIECES = {
     "heading": lambda: figures.heading(1.2, 0.3, 68),
     "far heading": lambda: figures.heading(None, 0.3, 68),
     "cards": lambda: figures.cards(NUMBERS),
-    "flex": lambda: figures.flex_words("nose forward, chin back", -1.4, 1.2),
+    "flex": lambda: figures.flex_words(["nose forward, chin back"]),
     "spoken": lambda: figures.spoken(NUMBERS),
     "marks": lambda: figures.photo_marks(photo()),
     "picture": lambda: figures.photo_picture(b"\xff\xd8jpeg"),
@@ -76,7 +76,7 @@ def test_every_piece_is_well_formed(name):
     "html",
     [
         lambda: figures.photo_marks(photo(HOSTILE)),
-        lambda: figures.flex_words(HOSTILE, -1, 1),
+        lambda: figures.flex_words([HOSTILE]),
         lambda: figures.cards(replace(NUMBERS, eyes_meaning=HOSTILE)),
     ],
     ids=["caption", "words", "meaning"],

@@ -103,7 +103,7 @@ def test_links_are_readable_and_stay_as_they_are(text):
 
 def test_what_means_the_same_is_one_text():
     same = (
-        {"yaw": -0.0, "flex": [(1, 0.0)], "overlays": {"scale", "ghost", "points"}},
+        {"yaw": -0.0, "flex": [(1, 0.0)], "overlays": {"scale", "points"}},
         {"distance": 1.2000001, "zoom": 1},
         {"orbit": None, "pins": []},
     )

@@ -7,6 +7,9 @@ from types import SimpleNamespace
 from typing import Any
 from unittest.mock import MagicMock
 
+import numpy as np
+
+from faceambig_app import figures
 from faceambig_app.actions import ACTIONS
 from faceambig_app.panel import Change, Panel
 from faceambig_app.state import DEFAULT, ViewState, changed
@@ -16,7 +19,9 @@ class Widget:
     """Keeps its listener, as viser's handles do."""
 
     def __init__(self, label: str, *_: Any, **__: Any) -> None:
-        self.label, self.value = label, None
+        self.label = label
+        self.value: Any = None
+        self.disabled, self._marks = False, ()
         self._impl = SimpleNamespace(uuid=label)
 
     def on_update(self, listener: Any) -> None:
@@ -80,7 +85,7 @@ def test_the_slider_of_mode_a_leaves_the_other_modes():
     assert slider.value == 0.0
     slider.hears(0)
     assert told[-1](changed(state, flex=[(2, 1.0)])).flex == ((2, 1.0),)
-    gui.widgets["Zero"].hears(None)
+    gui.widgets["Modes"].hears("Zero")
     zero = ACTIONS[acts[-1]].change
     assert zero is not None
     assert zero(state).flex == ()
@@ -100,3 +105,83 @@ def test_what_show_writes_is_not_heard():
     event = SimpleNamespace(client_id=None, target=SimpleNamespace(value=3))
     asyncio.run(gui.widgets["Assumed distance"].listener(event))
     assert told == []
+
+
+def test_the_window_of_sliders_follows_the_state():
+    state = changed(DEFAULT, flex=[(1, 2.0), (5, -4.0)], flex_from=4)
+    _, gui, told, acts = panel_of(state)
+    b = gui.widgets["Mode B (mm)"]
+    assert b.value == -4.0
+    assert gui.widgets["Mode A (mm)"].value == 0.0
+    b.hears(1.5)
+    assert told[-1](state).flex == ((1, 2.0), (5, 1.5))
+    gui.widgets["Modes"].hears("Next three")
+    onward = ACTIONS[acts[-1]].change
+    assert onward is not None
+    assert onward(state).flex_from == 7
+    assert onward(state).flex == state.flex
+    assert onward(changed(DEFAULT, flex_from=67)).flex_from == 1  # of 70 modes
+
+
+def test_sliders_are_told_their_words_and_marks():
+    panel, gui, _, _ = panel_of(DEFAULT)
+    panel.flex.tell([("A: nose forward", ((-1.5, "face"), (1.5, ""))), ("B: ears back", ())])
+    a, b, c = (gui.widgets[f"Mode {letter} (mm)"] for letter in "ABC")
+    assert (a.label, b.label, c.label) == ("A: nose forward", "B: ears back", "Mode C (mm)")
+    assert [(mark.value, mark.label) for mark in a._marks] == [(-1.5, "face"), (1.5, "")]
+    assert (a.disabled, b.disabled, c.disabled) == (False, False, True)
+
+
+def test_a_surprise_is_as_strong_as_the_slider_and_the_state_decides_it():
+    _, gui, told, _ = panel_of(DEFAULT)
+    gui.widgets["Strength (mm)"].value = 3.0
+    gui.widgets["Other faces"].hears("Surprise me")
+    state = changed(DEFAULT, extreme=2, draw=5, flex_from=4)
+    mixed = told[-1](state)
+    assert mixed == told[-1](state)
+    assert [mode for mode, _ in mixed.flex] == [4, 5, 6]
+    # rounded to a tenth of a millimetre each
+    assert abs(sum(mm**2 for _, mm in mixed.flex) ** 0.5 - 3.0) < 0.1
+    assert (mixed.extreme, mixed.draw) == (None, None)
+    assert told[-1](mixed).flex != mixed.flex
+
+
+def test_other_faces_come_one_after_the_other_and_a_bend_ends_them():
+    state, seen = DEFAULT, []
+    for _ in range(3):
+        state = changed_by("draw", state)
+        seen.append(state.draw)
+    assert seen == [0, 1, 2]
+    assert changed_by("draw", changed(DEFAULT, draw=9999)).draw == 0
+    one = changed_by("extremes", state)
+    two = changed_by("extremes", one)
+    assert [(s.extreme, s.draw) for s in (one, two, changed_by("extremes", two))] == [
+        (1, None), (2, None), (1, None),
+    ]  # fmt: skip
+    _, gui, told, _ = panel_of(two)
+    gui.widgets["Mode A (mm)"].hears(1.0)
+    assert told[-1](two) == changed(DEFAULT, flex=[(1, 1.0)])
+    assert changed_by("unbend", two) == DEFAULT
+
+
+def changed_by(action: str, state: ViewState) -> ViewState:
+    change = ACTIONS[action].change
+    assert change is not None
+    return change(state)
+
+
+def test_pins_are_listed_with_their_distances_and_an_empty_list_says_what_to_do():
+    assert "Nothing pinned yet. Press M to keep this face." in figures.pins(
+        (), (), np.zeros((0, 0))
+    )
+    d_s = np.array([[0.0, 2.34], [2.34, 0.0]])
+    html = figures.pins(("Pin 1", "Pin 2"), ("Person 2, a < b", "Person 3"), d_s)
+    assert html.count("2.3") == 2
+    assert "a &lt; b" in html
+    alone = figures.pins(("Pin 1",), ("Person 2",), np.zeros((1, 1)))
+    assert "<table>" not in alone
+
+
+def test_a_hidden_distance_is_not_in_the_first_words():
+    assert "30\u202fcm" in figures.heading(1.2, 0.3, 68)
+    assert "30\u202fcm" not in figures.heading(1.2, None, 68)

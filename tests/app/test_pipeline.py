@@ -13,12 +13,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import faceambig as fa
+from faceambig.camera import Camera, project
+from faceambig.compose import spread_colours
 from faceambig.flex import Linearisation, plausible_limit
+from faceambig.metrics import surface_difference
+from faceambig.rotation import rotation_matrix
 from faceambig.scene import Curves
 from faceambig_app import faces, files, fits, likely, pipeline, scenes
 from faceambig_app.fields import VIEWS
-from faceambig_app.pipeline import draft, flex_of, frame
+from faceambig_app.likely import Source
+from faceambig_app.pipeline import draft, frame, plots_of
 from faceambig_app.state import DEFAULT, FIELDS, ViewState, changed
+from faceambig_app.text import say
+from faceambig_app.told import flex_lines, flex_of, pins_of, sliders_of, spectrum_of, told
 from states import made, values
 
 STEPS = (fits, likely, faces, scenes)
@@ -317,3 +324,252 @@ def test_a_setting_left_alone_suits_a_model_with_fewer_modes(embedded, monkeypat
     asked = changed(state, modes=31)
     with pytest.raises(ValueError, match="modes: 31 of a model with 30; give at most 30"):
         fits.fitted(asked.target, asked.fitting)
+
+
+# ---- every choice of every field ----
+
+CHOICES = [
+    (name, choice)
+    for name in ("camera", "scheme", "data", "flex_at", "show", "surface", "view", "error_scale")
+    for choice in FIELDS[name].choices
+] + [
+    (name, (choice,)) for name in ("overlays", "hide") for choice in FIELDS[name].choices
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "choice"), CHOICES)
+def test_every_choice_gives_a_frame_and_a_draft(name, choice):
+    orbit = (40.0, -10.0) if choice == "free" else None
+    state = changed(DEFAULT, **{name: choice, "orbit": orbit})
+    full, moving = frame(state, with_curves=False), draft(state, state)
+    for shown in (full, moving):
+        assert shown.state == state
+        assert shown.scene.heads
+        assert all(np.isfinite(head.vertices).all() for head in shown.scene.heads)
+    assert [head.name for head in moving.scene.heads] == [head.name for head in full.scene.heads]
+    scene = full.scene
+    if scene.legend is not None:
+        assert scene.legend.title
+        assert scene.legend.note
+    if name == "overlays":
+        photo = scene.photo
+        there = {
+            "points": photo.points_shown,
+            "marks": bool(scene.marks),
+            "names": photo.names_shown,
+            "errors": photo.error_scale == 1.0,
+            "rays": [line.name for line in scene.lines] == ["rays", "rays"],
+            "pyramid": [line.name for line in scene.lines] == ["pyramid", "pyramid"],
+            "ghost": len(scene.heads) == 3,
+            "scale": scene.scale_bar > 0,
+            "outline": photo.outline is not None,
+        }
+        assert [overlay for overlay, drawn in there.items() if drawn] == [choice[0]]
+    if name == "hide":
+        assert scene.hide == {choice[0]}
+
+
+def test_the_legend_is_that_of_the_surface():
+    titles = {
+        surface: frame(changed(DEFAULT, surface=surface), with_curves=False).scene.legend
+        for surface in FIELDS["surface"].choices
+    }
+    assert {name: scale and scale.title for name, scale in titles.items()} == {
+        "clay": None,
+        "skin": None,
+        "difference": say("legend.difference"),
+        "depth": say("legend.depth"),
+        "spread": say("legend.spread"),
+    }
+    over = changed(DEFAULT, show="difference", surface="spread")
+    assert frame(over, with_curves=False).scene.legend.title == say("legend.difference")  # type: ignore[union-attr]
+
+
+def test_the_outline_is_a_contour_fit_whose_bends_keep_the_pairs():
+    state = changed(DEFAULT, data="outline", distance=0.6)
+    taken, fit = fits.photograph(state.target), fits.fitted(state.target, state.fitting)
+    model = taken.subject.model
+    contour = fa.contour_fit(
+        model, taken.observation, fits.edges(state.target), distance=0.6, noise_percent=1.0
+    )
+    assert len(contour.pairs) > 100
+    assert np.array_equal(fit.alpha, contour.fit.alpha)
+    everything = fits.explained(state.target, state.fitting)
+    # the same optimum twice, each to 1e-8 of its cost
+    assert everything.cost == pytest.approx(contour.cost, rel=1e-6)
+    shown = frame(state, with_curves=False)
+    assert shown.points == len(contour.pairs) + 68
+    assert shown.scene.numbers.d_l_percent == pytest.approx(contour.fit.d_l_percent, rel=1e-9)
+    assert shown.scene.photo.observed.shape == (68, 2)
+
+
+def test_all_points_are_fitted_and_the_landmarks_shown():
+    state = changed(DEFAULT, data="dense", distance=0.3)
+    shown = frame(state, with_curves=False)
+    fit = fits.fitted(state.target, state.fitting)
+    assert shown.points == len(fit.observation.points) > 5000
+    assert shown.scene.numbers.d_l_percent == pytest.approx(fit.d_l_percent, rel=1e-9)
+    assert shown.scene.photo.projected.shape == (68, 2)
+    gaps = np.linalg.norm(shown.scene.photo.projected - shown.scene.photo.observed, axis=1)
+    assert gaps.max() < 2  # pixels, of an eye distance of 100
+    marks = frame(changed(state, overlays=("marks",)), with_curves=False).scene.marks
+    assert [len(mark.points) for mark in marks] == [68, 68]
+
+
+def test_ten_draws_are_ten_whole_faces_with_cameras_of_their_own():
+    of = likely.source(DEFAULT.target, DEFAULT.fitting)
+    found = likely.posterior(of)
+    near, far = found.interval(0.99).low, found.interval(0.99).high or np.inf
+    faces_drawn = []
+    for number in range(10):
+        state = changed(DEFAULT, draw=number)
+        scene = frame(state, with_curves=False).scene
+        sample = found.sample(1, seed=number)
+        assert np.array_equal(likely.drawn(of, number).alpha, sample.alpha[0])
+        # the camera stands where the draw says, and nothing but the pose was sought there
+        distance = scene.numbers.distance or np.inf
+        assert distance == pytest.approx(float(sample.distances[0]))
+        assert near < distance < far
+        assert scene.numbers.d_l_percent < 2  # percent: each explains the points, the noise is 1 %
+        faces_drawn.append(scene.heads[1].vertices)
+        assert scene.heads[1].title == say("head.draw", number=number + 1)
+    gaps = [
+        np.linalg.norm(a - b, axis=1).mean()
+        for i, a in enumerate(faces_drawn)
+        for b in faces_drawn[:i]
+    ]
+    assert min(gaps) > 5e-4  # metres: half a millimetre over the whole head
+    words = told(changed(DEFAULT, draw=2))
+    interval = found.interval(0.95)
+    assert "(draw 3)" in words
+    assert f"{100 * interval.low:.0f}\u202fcm" in words
+
+
+def test_the_camera_of_a_draw_is_the_best_at_its_distance():
+    of = likely.source(DEFAULT.target, DEFAULT.fitting)
+    observation = fits.photograph(DEFAULT.target).observation
+    model = fits.model("embedded")
+    for number in range(3):
+        alpha, camera = likely.drawn(of, number)
+        landmarks = model.vertices(alpha)[observation.vertices(model)]
+
+        def cost(other: Camera, at: np.ndarray = landmarks) -> float:
+            gaps = project(other, at) + observation.centre - observation.points
+            return float((gaps**2).sum())
+
+        least = cost(camera)
+        rng = np.random.default_rng(number)
+        for _ in range(20):
+            turn, shift, size = rng.normal(scale=1e-3, size=3), *rng.normal(scale=1e-3, size=2)
+            step = Camera(
+                rotation_matrix(turn) @ camera.R,
+                camera.t + 1e-2 * shift,
+                camera.s * (1 + size),
+                camera.kappa,
+            )
+            assert cost(step) > least
+
+
+def test_the_extreme_faces_are_those_of_the_library_and_their_words_say_how_far():
+    fit = fits.fitted(DEFAULT.target, DEFAULT.fitting)
+    found = likely.extremes(DEFAULT.target, DEFAULT.fitting)
+    for number, face in enumerate(found.faces, 1):
+        state = changed(DEFAULT, extreme=number)
+        scene = frame(state, with_curves=False).scene
+        shown = faces.face(state.target, state.fitting, state.bend)
+        assert np.array_equal(shown.own_vertices, fit.model.vertices(face.alpha))
+        assert scene.numbers.d_l_percent == pytest.approx(face.d_l_percent, rel=1e-9)
+        assert scene.numbers.d_l_percent <= 3.0
+        words = told(state)
+        assert f"{face.rms_mm:.1f}\u202fmm" in words
+        assert f"{found.bound_mm:.1f}\u202fmm" in words
+    assert told(DEFAULT) == ""
+
+
+def test_a_draft_asks_for_nothing_that_takes_long(monkeypatch):
+    rested = changed(DEFAULT, surface="spread", draw=1)
+    frame(rested)
+
+    def slow(*_: Any, **__: Any) -> Any:
+        raise AssertionError("computed in a draft")
+
+    for name in ("posterior", "extreme_faces", "sweep_distance"):
+        monkeypatch.setattr(fa, name, slow)
+    shown = draft(changed(rested, zoom=2.0), rested).scene
+    assert shown.heads[1].title == say("head.draw", number=2)
+    sd = likely.spread(likely.source(rested.target, rested.fitting))
+    moved = changed(rested, subject=9, distance=0.5, extreme=1)
+    shown = draft(moved, rested).scene
+    plain_fit = faces.face(moved.target, moved.fitting, changed(DEFAULT).bend)
+    assert np.array_equal(shown.heads[1].vertices, plain_fit.vertices)
+    assert np.array_equal(shown.heads[1].colours, spread_colours(plain_fit.fit.model, sd))
+    unlike = draft(changed(moved, draw=None, extreme=None)).scene  # nothing shown before
+    assert unlike.legend is None
+
+
+def test_the_curves_say_how_likely_each_distance_is():
+    plot = plots_of(DEFAULT)
+    density = likely.posterior(likely.source(DEFAULT.target, DEFAULT.fitting)).distance_density
+    assert plot.density is not None
+    assert plot.density.max() == 1
+    ends = density.quantiles([0.25, 0.75, 0.025, 0.975])
+    assert np.allclose(np.ravel(plot.intervals), ends)
+    assert plots_of(changed(DEFAULT, distance=0.4)) is plot
+    # the library's own, asked directly
+    taken = fits.photograph(DEFAULT.target)
+    same = fa.posterior(taken.subject.model, taken.observation, noise_percent=DEFAULT.prior)
+    assert same.interval(0.95) == likely.posterior(Source(DEFAULT.target, 1.0)).interval(0.95)
+
+
+def test_every_cache_is_bounded():
+    assert len(CACHED) >= 15
+    for function in CACHED:
+        assert 0 < function.cache_info().maxsize <= 2048, function.__name__
+
+
+def test_pins_stand_in_the_row_with_their_names_and_are_compared():
+    pins = [changed(DEFAULT, distance=0.6), changed(DEFAULT, subject=3), changed(DEFAULT, draw=4)]
+    state = changed(DEFAULT, pins=pins, show="row")
+    scene = frame(state).scene
+    assert [head.name for head in scene.heads] == ["pin1", "pin2", "pin3"]
+    assert scene.heads[0].title == "Pin 1, assumed 60\u202fcm"
+    kept = pins_of(state)
+    one, two = (faces.face(pin.target, pin.fitting, pin.bend) for pin in pins[:2])
+    between = surface_difference(
+        one.own_vertices, two.own_vertices, one.fit.model.evaluation
+    ).mean_mm
+    assert kept.d_s_mm[0, 1] == pytest.approx(between)
+    assert np.allclose(kept.d_s_mm, kept.d_s_mm.T, rtol=0, atol=1e-6)
+    assert "Person 3" in kept.words[1]
+    assert f"{two.d_s_mm:.1f}\u202fmm" in kept.words[1]
+    # photograph and numbers beside the row are the state's
+    alone = frame(changed(DEFAULT), with_curves=False).scene
+    assert scene.numbers == alone.numbers
+    assert np.array_equal(scene.photo.projected, alone.photo.projected)
+    hidden = changed(state, hide=("numbers", "actual"))
+    assert "30\u202fcm" not in pins_of(hidden).words[0]
+    assert "mm" not in pins_of(hidden).words[0]
+    assert pins_of(DEFAULT).d_s_mm.shape == (0, 0)
+
+
+def test_what_a_slider_says_is_its_mode():
+    state = changed(DEFAULT, flex_from=4, flex=[(1, 2.0), (5, 1.0)])
+    modes = flex_of(state)
+    labels = [label for label, _ in sliders_of(state)]
+    assert labels == [
+        f"{letter}: {modes[k].words}" for letter, k in zip("ABC", (3, 4, 5), strict=True)
+    ]
+    fit = fits.fitted(state.target, state.fitting)
+    ours = fa.flexibility_modes(fit.model, fit, 6)
+    for (_, marks), k in zip(sliders_of(state), (3, 4, 5), strict=True):
+        ends = [mm for mm in ours.reach(k) if abs(mm) <= 10]
+        assert {round(mm, 2) for mm in ends} <= {mm for mm, _ in marks}
+    lines = flex_lines(state)
+    assert len(lines) == 4
+    assert modes[0].words in lines[3]
+    reach, words = spectrum_of(state)
+    assert list(words) == [mode.words for mode in modes[:10]]
+    for mm, mode in zip(reach, modes, strict=True):
+        moved = mm * ours.landmark_percent[mode.number - 1] if mode.number <= 6 else 0.0
+        assert moved <= 1 + 1e-9
+        assert mm <= mode.high

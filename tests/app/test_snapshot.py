@@ -76,3 +76,37 @@ def test_the_picture_carries_its_state(tmp_path):
     snapshot(ViewState(subject=4, distance=0.6), tmp_path / "a.png", width=640, height=400)
     with PngImageFile(tmp_path / "a.png") as picture:
         assert picture.text["ViewState"] == '{"subject":4,"distance":0.6}'
+
+
+LOOKS = {
+    "ghost": {"overlays": ("points", "scale", "ghost")},
+    "marks": {"overlays": ("points", "scale", "marks")},
+    "rays": {"overlays": ("points", "scale", "rays")},
+    "outline": {"overlays": ("points", "scale", "outline")},
+    "overlay": {"show": "overlay"},
+    "spread": {"surface": "spread"},
+    "draw": {"draw": 3},
+    "hidden": {"hide": ("truth",)},
+}
+
+
+def test_every_look_is_to_be_seen_in_its_part_of_the_picture():
+    """Photograph, heads and numbers are columns; what a look draws changes its own and leaves the others."""
+    size = {"width": 720, "height": 450}
+    plain = snapshot(ViewState(), **size)[:, :, :3].astype(int)
+    photograph, heads, numbers = slice(0, 185), slice(190, 530), slice(535, 720)
+    changes = {}
+    for name, look in LOOKS.items():
+        seen = snapshot(ViewState(**look), **size)[:, :, :3].astype(int)
+        moved = np.abs(seen - plain).max(axis=2) > CLEARLY
+        changes[name] = tuple(bool(moved[:, part].any()) for part in (photograph, heads, numbers))
+    assert changes == {
+        "ghost": (False, True, False),
+        "marks": (False, True, False),
+        "rays": (False, True, False),
+        "outline": (True, False, False),
+        "overlay": (False, True, False),
+        "spread": (False, True, False),
+        "draw": (True, True, True),
+        "hidden": (False, True, True),
+    }

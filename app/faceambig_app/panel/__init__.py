@@ -38,6 +38,7 @@ class Places:
     plots: viser.GuiHtmlHandle
     legend: viser.GuiHtmlHandle
     flex: viser.GuiHtmlHandle  # what the flexibility modes move
+    spectrum: viser.GuiHtmlHandle  # and how far
     pins: viser.GuiHtmlHandle  # the faces kept, and their distances
     spoken: viser.GuiHtmlHandle
     data: viser.GuiHtmlHandle  # of the page's script
@@ -73,7 +74,7 @@ class Panel:
             explore.build_distance(w)
             cards, legend, plots = gui.add_html(""), gui.add_html(""), gui.add_html("")
             explore.build_rest(w, people)
-            words = flex.build(w)
+            self.flex = flex.Flex(w)
             explore.build_data(w)
             explore.build_history(w)
         with tabs.add_tab(say("panel.view")):
@@ -85,7 +86,8 @@ class Panel:
         spoken, told = gui.add_html(""), gui.add_html("")
         gui.main_panel.dock_right()
         gui.main_panel.set_width(SIDE_WIDTH)
-        self.places = Places(style, *photo, cards, plots, legend, words, pins, spoken, told)
+        folded = self.flex.words, self.flex.spectrum
+        self.places = Places(style, *photo, cards, plots, legend, *folded, pins, spoken, told)
 
     @property
     def controls(self) -> tuple[viser.GuiInputHandle, ...]:
