@@ -12,17 +12,32 @@ from typing import cast
 
 import viser
 
-from . import figures, guard, history, photograph, plots
+from . import figures, guard, history, own_page, photograph, plots
 from .actions import ACTIONS
 from .fields import FIELDS
 from .forms import command
 from .glide import Glide
 from .link import query
 from .notices import from_query
+from .own import OwnPhoto, own_frame, told_distance
+from .own_room import OwnRoom
 from .panel import Change, Panel
+from .panel.widgets import setting
 from .pipeline import Frame, curve_key, curve_of, frame, model, photo_jpeg
 from .room import Dispatcher, Room
-from .script import Copied, Dark, Hello, Key, Report, Script, Theme, is_dark
+from .script import (
+    Click,
+    Copied,
+    Dark,
+    Gone,
+    Hello,
+    Key,
+    Point,
+    Report,
+    Script,
+    Theme,
+    is_dark,
+)
 from .stage import Stage
 from .state import DEFAULT, ViewState, changed
 from .style import STYLE, text_size
@@ -47,15 +62,25 @@ class Browser:
         self._glide = Glide(self._glided)
         self._still = False  # whether this person wants no motion
         self._dark = False  # whether this person's system is dark
+        self._owned = False  # whether there is a photograph of this person
         self._curves_of: object = None  # what the plots show
         self._picture_of: object = None  # what the photograph shows: (target, draft)
         self.stage = Stage(client, self._orbited)
         self._dress()
         self.script = Script(client.gui, self.report)
-        people = {
+        people: dict[int | str, str] = {
             index: subject.name for index, subject in enumerate(model(DEFAULT.model).subjects, 1)
         }
-        self.panel = Panel(client.gui, people, self.change, self.act, narrow=self.stage.narrow)
+        people["photo"] = say("own.mine")
+        self._own = OwnRoom(loop, self._own_changed, self.notice)
+        self._own.model = DEFAULT.model
+        self._hint: float | None = (
+            None  # metres: of the camera, as the own photograph's file tells it
+        )
+        self.panel = Panel(
+            client.gui, people, self.change, self.act, narrow=self.stage.narrow,
+            own=self._own, use_hint=self._use_hint,
+        )  # fmt: skip
         style = STYLE + figures.hidden_boxes(self.panel.widgets.step_sliders)
         self.panel.places.style.content = style
         self.panel.show(self.room.state)
@@ -70,6 +95,7 @@ class Browser:
     def leave(self) -> None:
         """The browser has gone: compute nothing more for it."""
         self.room.left = True
+        self._own.leave()
         self._glide.stop()
 
     def change(self, change: Change) -> None:
@@ -148,8 +174,29 @@ class Browser:
             case Copied():
                 words = say("copy.done") if report.ok else say("copy.by_hand")
                 self._client.add_notification(say("app.title"), words, auto_close_seconds=3.0)
-            case _:
-                pass
+            case Point() | Click() | Gone():
+                self._own.hear(report)
+
+    def _own_changed(self) -> None:
+        """Another photograph, other points, or none any more: show them."""
+        own, state = self._own.photo, self.room.state
+        if (own is not None) != self._owned:
+            self._owned = own is not None
+            subject = "photo" if self._owned else DEFAULT.subject
+            if self._owned or state.subject == "photo":
+                self._go(changed(state, subject=subject))
+        self._show_own()
+        self.room.again()
+
+    def _show_own(self) -> None:
+        own = self._own
+        self.panel.own.show(
+            own_page.shown(own.photo, own.status, can_undo=own.can_undo, hint=self._hint)
+        )
+
+    def _use_hint(self) -> None:
+        if self._hint is not None:
+            self.change(setting("distance", round(self._hint, 3)))
 
     def _hello(self, hello: Hello) -> None:
         """A browser has come, or come back: go where its address says."""
@@ -203,8 +250,15 @@ class Browser:
 
     def draw(self, state: ViewState, draft: bool) -> None:
         """Compute a state and send it. Computing is done before the lock of atomic(), never inside."""
-        shown = frame(state, with_curves=not draft)
-        html = self._contents(state, shown, draft)
+        if state.subject == "photo":
+            own = self._own.photo
+            shown = own_frame(own, state, draft)
+            html = self._own_contents(own, state, shown, draft)
+            hint = None if draft else told_distance(own, state)
+        else:
+            hint = None
+            shown = frame(state, with_curves=not draft)
+            html = self._contents(state, shown, draft)
         if self.room.left:  # while this was computed
             return
         with self._client.atomic():
@@ -213,7 +267,7 @@ class Browser:
                 handle.content = content
         self._client.flush()
         if not draft:
-            self._loop.call_soon_threadsafe(self._settle, state)
+            self._loop.call_soon_threadsafe(self._settle, state, hint)
 
     def _contents(self, state: ViewState, shown: Frame, draft: bool) -> Contents:
         """What the elements of the panel show of a frame."""
@@ -237,6 +291,36 @@ class Browser:
             html += self._at_rest(state, shown)
         return html
 
+    def _own_contents(
+        self, own: OwnPhoto | None, state: ViewState, shown: Frame, draft: bool
+    ) -> Contents:
+        """As `_contents`, of a person's own photograph."""
+        at, scene = self.panel.places, shown.scene
+        cards, marks = own_page.cards(own, state, scene), own_page.marks(own, scene)
+        html: Contents = [(at.crosses, "")]
+        if self.stage.narrow:  # one below the other: a finger needs a large photograph
+            html.append((at.marks, marks + cards))
+        else:
+            html += [(at.cards, cards), (at.marks, marks)]
+        taken = None if own is None else own.taken
+        if self._picture_of is not taken or taken is None:
+            picture = "" if taken is None else photograph.photo_picture(taken.jpeg)
+            html.append((at.picture, picture))
+            self._picture_of = taken
+        if not draft:
+            self._curves_of = None
+            words = own_page.spoken(own, state, scene) + figures.heads_words(scene)
+            flex = figures.flex_words(shown.flex_words, *shown.flex_reach)
+            html += [
+                (at.plots, own_page.curves(own, state, scene)),
+                (at.legend, "" if scene.legend is None else figures.legend(scene.legend)),
+                (at.spoken, words),
+                (at.data, self.panel.spoken(state) + text_size(state.text)),
+                (at.flex, flex if shown.flex_words else ""),
+                (at.heading, own_page.heading(own, state)),
+            ]
+        return html
+
     def _at_rest(self, state: ViewState, shown: Frame) -> Contents:
         at, scene = self.panel.places, shown.scene
         low, high = shown.flex_reach
@@ -250,9 +334,11 @@ class Browser:
             (at.heading, figures.heading(scene.numbers.distance, state.actual, points)),
         ]
 
-    def _settle(self, drawn: ViewState) -> None:
+    def _settle(self, drawn: ViewState, hint: float | None) -> None:
         """At rest, on the loop: what the controls show is what is, even where messages crossed on the way."""
         if not self.room.left and self.room.state == drawn:
+            self._hint = hint
+            self._show_own()
             self.script.address(query(drawn))
             self.panel.show(drawn)
             guard.restate(self._client, self.panel.controls)

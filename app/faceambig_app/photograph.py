@@ -7,6 +7,7 @@ hand is the circles. White halos: on skin the two colours alone are too weak.
 from __future__ import annotations
 
 import base64
+from dataclasses import replace
 from html import escape
 
 import numpy as np
@@ -42,13 +43,17 @@ def photo_marks(
     draggable: bool = False,
     hover: bool = True,
     landmarks: IntArray | None = None,
+    place: bool = False,
+    part: tuple[float, float, float, float] | None = None,
 ) -> str:
     """The points on the photograph, with the key below.
 
     crosses: False where `photo_crosses` is in the page. draggable: each point is a button that the page's script moves;
     the photograph then says its size in pixels. hover: names and gaps under the pointer, 8 kB that a hand on a slider
-    does not need. landmarks: (L,) vertices of the points, whose depth turns the gaps into millimetres.
+    does not need. landmarks: (L,) vertices of the points, whose depth turns the gaps into millimetres. place: a click
+    places a point. part: x, y, width and height of what is shown, pixels; None: all.
     """
+    whole, photo = photo, photo if part is None else replace(photo, width=part[2], height=part[3])
     points = draggable or photo.points_shown
     drawn = [_outline(photo), _errors(photo) if points else ""]
     if points:
@@ -57,13 +62,29 @@ def photo_marks(
         drawn += [_buttons(photo)] if draggable else []
         drawn += [_hover(photo, landmarks)] if hover and not draggable else []
     role = "group" if draggable else "img"  # a picture would hide its buttons from a screen reader
-    size = f' data-fa-photo="{photo.width}x{photo.height}"' if draggable else ""
+    size = f' data-fa-photo="{whole.width}x{whole.height}"' if draggable or place else ""
+    size += ' data-fa-place="1"' if place else ""
+    x, y, style = 0.0, 0.0, ""
+    if part is not None:
+        x, y = part[:2]
+        size += f' data-fa-view="{",".join(f"{number:g}" for number in part)}"' if size else ""
+        style = _cut(whole, part)
     words = escape(_alternative(photo, landmarks))
     return (
-        f'<div class="fa"><div class="fa-photo" style="aspect-ratio:{photo.width}/{photo.height}"{size}>'
-        f'<svg viewBox="0 0 {photo.width} {photo.height}" role="{role}" aria-label="{words}" '
+        f'<div class="fa"><div class="fa-photo" style="aspect-ratio:{photo.width:g}/{photo.height:g}{style}"{size}>'
+        f'<svg viewBox="{x:g} {y:g} {photo.width:g} {photo.height:g}" role="{role}" aria-label="{words}" '
         f'fill="none">{"".join(drawn)}</svg><em>{escape(photo.caption)}</em></div>{_key() if points else ""}</div>'
     )
+
+
+def _cut(photo: Photo, part: tuple[float, float, float, float]) -> str:
+    """The style by which the background shows a part of the picture alone."""
+    x, y, width, height = part
+    sizes = 100 * photo.width / width, 100 * photo.height / height
+    # A position in percent puts this share of the picture on this share of the box
+    places = 100 * x / max(photo.width - width, 1e-9), 100 * y / max(photo.height - height, 1e-9)
+    size, place = (" ".join(f"{share:.4f}%" for share in pair) for pair in (sizes, places))
+    return f";background-size:{size};background-position:{place}"
 
 
 def gaps_mm(photo: Photo, landmarks: IntArray | None = None) -> Array:
@@ -115,7 +136,8 @@ def _buttons(photo: Photo) -> str:
         words = say("photo.point", name=_name(photo, index), x=f"{x:.0f}", y=f"{y:.0f}")
         cross = _cross(x, y, CROSS * unit)
         parts.append(
-            f'<g data-fa-point="{index}" tabindex="0" role="button" aria-label="{escape(words)}">'
+            f'<g data-fa-point="{index}" data-fa-at="{x:.2f},{y:.2f}" tabindex="0" role="button" '
+            f'aria-label="{escape(words)}">'
             f'<path class="fa-hit" d="M{x:.1f} {y:.1f}h.01"><title>{escape(words)}</title></path>'
             f'<path d="{cross}" stroke="#FFF" stroke-width="{3.4 * unit:.1f}"/>'
             f'<path d="{cross}" stroke="{RED}" stroke-width="{1.7 * unit:.1f}"/></g>'

@@ -55,6 +55,11 @@ class Room:
         self._changed_at = time.monotonic()
         self._ring(self, 0.0)
 
+    def again(self) -> None:
+        """What is drawn has changed, though the state has not: ask to be served. On the event loop only."""
+        self._changed_at = time.monotonic()
+        self._ring(self, 0.0)
+
     def open(self) -> None:
         """Ask for the first frame, in full."""
         self._ring(self, 0.0)

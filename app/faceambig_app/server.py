@@ -17,6 +17,7 @@ import viser
 from . import guard
 from .browser import Browser
 from .fields import FIELDS
+from .panel.data import POINTS
 from .pipeline import frame, model
 from .room import Dispatcher
 from .stage import FAR, FIRST_FOV, FIRST_POSITION, NEAR
@@ -81,6 +82,10 @@ class Page:
 
 def refusal(control: Any, asked: object, put: object) -> str:
     """The notice for a value a control may not have."""
+    if isinstance(control, viser.GuiUploadButtonHandle):
+        if control.mime_type == POINTS:
+            return say("own.points_large")
+        return say("own.unreadable")
     low, high = getattr(control, "min", None), getattr(control, "max", None)
     if (
         isinstance(asked, (int, float))

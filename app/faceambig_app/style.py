@@ -55,6 +55,8 @@ font-size:calc(12.5px*var(--fa-scale,1));padding:1px 7px;border-radius:4px}.fa-p
 pointer-events:stroke;fill:none}
 [data-fa-point]{cursor:grab;outline:none}
 [data-fa-point]:focus-visible .fa-hit,[data-fa-point]:hover .fa-hit{stroke:#FFFA}
+.fa-photo[data-fa-place]{cursor:crosshair;touch-action:none}
+.fa-ask{display:grid;grid-template-columns:90px 1fr;gap:0 12px;align-items:center}.fa-ask svg{width:90px}
 .fa-defs{position:absolute;width:0;height:0}
 .fa-key{display:flex;flex-wrap:wrap;gap:0 16px;font-size:calc(12.5px*var(--fa-scale,1));
 color:var(--fa-dim);padding-top:4px}

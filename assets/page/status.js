@@ -42,6 +42,13 @@ function begin() {
 }
 document.addEventListener("DOMContentLoaded", begin);
 
+// Where what is sent goes: the address under which this browser knows the page.
+function nameHost() {
+  for (const element of document.querySelectorAll("[data-fa-host]")) {
+    if (element.textContent !== location.host) element.textContent = location.host;
+  }
+}
+
 // ---- what comes with the page, and what changes in it ---------------------------------------------------------------------
 for (const element of document.querySelectorAll("meta[data-faceambig]")) read(element);
 
@@ -50,4 +57,5 @@ new MutationObserver(() => {
   nameControls();
   nameCopies();
   readPhoto();
+  nameHost();
 }).observe(document, { childList: true, subtree: true });

@@ -19,7 +19,7 @@ from ..arrays import Array, IntArray, read_only
 from ..errors import AssetError
 from ..model import FaceModel
 from ..observation import MIN_POINTS
-from .files import replacing, text_of
+from .files import MAX_TEXT_BYTES, replacing, text_of
 from .pictures import picture_beside, picture_size
 from .points import FORMAT, VERSION, Points, parse_points
 from .schemes import JAW, MEDIAPIPE, ibug68_of_mesh
@@ -107,14 +107,39 @@ def load_landmarks(
         raise ValueError(f"image_size: {image_size!r} is not a width and a height in pixels")
     file = Path(path)
     found = parse_points(text_of(file), file.name)
-    size, origin = _size(file, image_size, found)
-    read = replace(_laid_out(found, file.name), image_size=size, image_size_from=origin)
-    read = _inside(_in_pixels(read, file.name), file.name)
+    return _read(found, file.name, *_size(file, image_size, found), model)
+
+
+def parse_landmarks(
+    data: bytes, *, name: str, image_size: tuple[int, int], model: FaceModel | None = None
+) -> LandmarkFile:
+    """As `load_landmarks`, of the bytes of a file called `name` and a picture of known size: nothing is on disk."""
+    if len(data) > MAX_TEXT_BYTES:
+        raise AssetError(f"{name}: {len(data)} bytes, a landmark file has at most {MAX_TEXT_BYTES}")
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise AssetError(f"{name}: not a text file") from error
+    found = parse_points(text, name)
+    _refuse_other_size(found, name, image_size, "given")
+    return _read(found, name, image_size, "given", model)
+
+
+def _read(
+    found: Points,
+    name: str,
+    size: tuple[int, int] | None,
+    origin: str,
+    model: FaceModel | None,
+) -> LandmarkFile:
+    """What of the points can be used, in a picture of `size`, known from `origin`."""
+    read = replace(_laid_out(found, name), image_size=size, image_size_from=origin)
+    read = _inside(_in_pixels(read, name), name)
     if model is not None:
         read = _on_model(read, model)
     # Too few from the start are for Observation to refuse, as for points that come from no file
     if read.used < MIN_POINTS and len(read.left_out) > (MISSING in read.left_out):
-        raise AssetError(f"{file.name}: {read.words}; {MIN_POINTS} are needed")
+        raise AssetError(f"{name}: {read.words}; {MIN_POINTS} are needed")
     return read
 
 
@@ -147,12 +172,16 @@ def _size(
     else:
         words = f"no picture beside {file.name}: the middle of the points stands for the middle of the picture"
         return None, words
+    _refuse_other_size(found, file.name, size, origin)
+    return size, origin
+
+
+def _refuse_other_size(found: Points, file: str, size: tuple[int, int], origin: str) -> None:
     if found.image_size not in (None, size):
         was = " x ".join(map(str, found.image_size or ()))
         raise AssetError(
-            f"{file.name}: made for a picture of {was} pixels, this one has {size[0]} x {size[1]} ({origin})"
+            f"{file}: made for a picture of {was} pixels, this one has {size[0]} x {size[1]} ({origin})"
         )
-    return size, origin
 
 
 def _laid_out(found: Points, file: str) -> LandmarkFile:

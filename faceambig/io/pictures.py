@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +30,7 @@ MAX_PIXELS = (
 )
 # Pixels are decoded of these; of TIFF only the size is read: libtiff reports damage to stderr by itself
 FORMATS = ("JPEG", "PNG", "WEBP", "BMP")
+WEB_FORMATS = ("JPEG", "PNG", "WEBP")  # of them, what people have on a telephone
 NAMED = "JPEG, PNG, WebP and BMP are accepted"
 # First bytes of pictures; those that are not accepted are still told apart from landmarks
 STARTS = (b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n", b"BM", b"II*\x00", b"MM\x00*", b"GIF8")
@@ -103,38 +105,61 @@ def read_picture(path: Path) -> Picture:
     AssetError: no picture of an accepted format, damaged or cut off, or of more than MAX_PIXELS.
     RuntimeError: Pillow is not installed.
     """
+    return _decoded(path, path.name, picture_size(path), FORMATS, MAX_PIXELS)
+
+
+def decode_picture(
+    data: bytes,
+    *,
+    name: str = "picture",
+    formats: tuple[str, ...] = FORMATS,
+    max_pixels: int = MAX_PIXELS,
+) -> Picture:
+    """As `read_picture`, of the bytes of a file: nothing is written. formats: of FORMATS, those that are accepted."""
+    size = _told_size(data[:HEADER_BYTES], name, BytesIO(data))
+    return _decoded(BytesIO(data), name, size, formats, max_pixels)
+
+
+def _decoded(
+    source: Path | BytesIO,
+    name: str,
+    size: tuple[int, int],
+    formats: tuple[str, ...],
+    max_pixels: int,
+) -> Picture:
+    """The picture of a file whose header tells `size`."""
     try:
         from PIL import Image, UnidentifiedImageError
     except ImportError as error:
         raise RuntimeError(
             "pictures are read by Pillow: pip install 'faceambig[render]'"
         ) from error
-    width, height = picture_size(path)
-    if width * height > MAX_PIXELS:
+    width, height = size
+    if width * height > max_pixels:
         raise AssetError(
-            f"{path.name}: {width} x {height} is {width * height / 1e6:.0f} million pixels, "
-            f"{MAX_PIXELS / 1e6:.0f} are accepted; make it smaller"
+            f"{name}: {width} x {height} is {width * height / 1e6:.0f} million pixels, "
+            f"{max_pixels / 1e6:.0f} are accepted; make it smaller"
         )
     with warnings.catch_warnings():
         # Pillow's remarks on odd files; what matters comes as an error
         warnings.simplefilter("ignore")
         try:
-            with Image.open(path, formats=FORMATS) as picture:
-                if picture.width * picture.height > MAX_PIXELS:  # a header that contradicts itself
-                    raise AssetError(f"{path.name}: its header tells two sizes")
+            with Image.open(source, formats=formats) as picture:
+                if picture.width * picture.height > max_pixels:  # a header that contradicts itself
+                    raise AssetError(f"{name}: its header tells two sizes")
                 turn, focal = _exif(picture)
-                rgb, notes = _rgb(picture, path.name)
+                rgb, notes = _rgb(picture, name)
         except AssetError:
             raise
         except UnidentifiedImageError as error:
-            raise AssetError(f"{path.name}: damaged, or not a picture; {NAMED}") from error
+            raise AssetError(f"{name}: damaged, or not a picture; {NAMED}") from error
         except (*DAMAGED, Image.DecompressionBombError) as error:
             words = " ".join(str(error).split()) or type(error).__name__
-            raise AssetError(f"{path.name}: damaged or cut off ({words:.100})") from error
+            raise AssetError(f"{name}: damaged or cut off ({words:.100})") from error
     if turn != 1:
         rgb = _upright(rgb, turn)
         notes = (f"turned upright (EXIF orientation {turn})", *notes)
-    return Picture(path.name, rgb, focal, notes)
+    return Picture(name, rgb, focal, notes)
 
 
 def _exif(picture: Image.Image) -> tuple[int, float | None]:
@@ -197,11 +222,17 @@ def picture_size(path: Path) -> tuple[int, int]:
             head = stream.read(HEADER_BYTES)
     except OSError as error:
         raise AssetError(f"{path}: cannot be read ({error.strerror or error})") from error
+    return _told_size(head, path.name, path)
+
+
+def _told_size(head: bytes, name: str, source: Path | BytesIO) -> tuple[int, int]:
+    """Width and height that the first bytes `head` of a file tell; of some formats Pillow reads it in the file."""
     size = _png(head) or _jpeg(head) or _webp(head) or _bmp(head)
-    if size is None or b"eXIf" in head or (head[8:16] == b"WEBPVP8X" and head[20] & 0x08):
-        size = _by_pillow(path) or size
+    webp_exif = head[8:16] == b"WEBPVP8X" and len(head) > 20 and head[20] & 0x08
+    if size is None or b"eXIf" in head or webp_exif:
+        size = _by_pillow(source) or size
     if size is None or not all(1 <= side <= MAX_SIDE for side in size):
-        raise AssetError(f"{path.name}: not a picture whose size can be read; {NAMED}")
+        raise AssetError(f"{name}: not a picture whose size can be read; {NAMED}")
     return size
 
 
@@ -270,7 +301,7 @@ def _bmp(head: bytes) -> tuple[int, int] | None:
     return int.from_bytes(head[18:22], "little", signed=True), abs(high)
 
 
-def _by_pillow(path: Path) -> tuple[int, int] | None:
+def _by_pillow(source: Path | BytesIO) -> tuple[int, int] | None:
     """Size of any other picture, if Pillow is installed; it reads headers only."""
     try:
         from PIL import Image
@@ -279,7 +310,7 @@ def _by_pillow(path: Path) -> tuple[int, int] | None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            with Image.open(path, formats=(*FORMATS, "TIFF")) as picture:
+            with Image.open(source, formats=(*FORMATS, "TIFF")) as picture:
                 width, height = picture.size
                 return (height, width) if _exif(picture)[0] in SIDEWAYS else (width, height)
         except (*DAMAGED, Image.DecompressionBombError):

@@ -22,7 +22,7 @@ class Widget:
     def on_update(self, listener: Any) -> None:
         self.listener = listener
 
-    on_click = on_update
+    on_click = on_upload = on_update
 
     def add_tab(self, label: str) -> Widget:
         return Widget(label)
@@ -56,7 +56,15 @@ def panel_of(state: ViewState) -> tuple[Panel, Gui, list[Change], list[str]]:
     gui, told, acts = Gui(), [], []
     made: Any = gui  # a stand-in
     made.main_panel = MagicMock()
-    panel = Panel(made, {1: "a", 2: "b", 3: "c"}, told.append, acts.append, narrow=True)
+    panel = Panel(
+        made,
+        {1: "a", 2: "b", 3: "c"},
+        told.append,
+        acts.append,
+        narrow=True,
+        own=MagicMock(),
+        use_hint=lambda: None,
+    )
     panel.show(state)
     return panel, gui, told, acts
 

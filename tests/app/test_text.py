@@ -15,10 +15,10 @@ from unittest.mock import MagicMock
 import pytest
 
 from faceambig.errors import AssetError
-from faceambig_app import panel, text
+from faceambig_app import own, panel, text
 from faceambig_app.actions import ACTIONS
 from faceambig_app.guard import page
-from faceambig_app.panel import compare, explore, flex, view, widgets
+from faceambig_app.panel import compare, data, explore, flex, view, widgets
 from faceambig_app.state import DEFAULT
 from faceambig_app.text import centimetres, distance_text, percent_number, say, words
 
@@ -74,7 +74,7 @@ def recorded(monkeypatch: pytest.MonkeyPatch) -> set[str]:
         seen.add(key)
         return say(key, **values)
 
-    for module in (panel, compare, explore, flex, view, widgets):
+    for module in (panel, compare, data, explore, flex, view, widgets):
         if hasattr(module, "say"):
             monkeypatch.setattr(module, "say", heard)
     return seen
@@ -82,15 +82,24 @@ def recorded(monkeypatch: pytest.MonkeyPatch) -> set[str]:
 
 def test_every_word_of_the_file_is_asked_for(recorded):
     # keys put together from names are those that a real panel looks up
-    shown = panel.Panel(MagicMock(), {1: "a"}, lambda _: None, lambda _: None, narrow=False)
+    shown = panel.Panel(
+        MagicMock(),
+        {1: "a"},
+        lambda _: None,
+        lambda _: None,
+        narrow=False,
+        own=MagicMock(),
+        use_hint=lambda: None,
+    )
     shown.spoken(DEFAULT)
     exact = {ask.replace("\\", "") for _, ask in ASKED if "[" not in ask}
     commands = {f"action.{name}{end}" for name in ACTIONS for end in ("", "_hint")}
     # whole sections go to the page's script
     whole = set(re.findall(r'words\(\)\["(\w+)"\]', inspect.getsource(page)))
     scripted = {key for key in KEYS if key.split(".")[0] in whole}
-    assert KEYS - exact - recorded - commands - scripted == set()
-    assert (exact | recorded | commands) - KEYS == set()
+    points = {f"point.{name}" for name in own.NAMED}
+    assert KEYS - exact - recorded - commands - scripted - points == set()
+    assert (exact | recorded | commands | points) - KEYS == set()
 
 
 def test_every_call_fills_in_the_names_its_words_have():

@@ -19,11 +19,12 @@ from .messages import MAX_BAD, MAX_MESSAGE
 from .page import PATCHES, make_page, our_script
 from .reports import MAX_REPORT, add_reports
 from .requests import listen
+from .uploads import MAX_UPLOAD, add_upload
 from .values import TYPING, restate
 
 __all__ = [
-    "MAX_BAD", "MAX_MESSAGE", "MAX_REPORT", "PATCHES", "TYPING", "Hooks", "ServeError", "add_colours", "add_reports",
-    "data_html", "log_line", "restate", "start",
+    "MAX_BAD", "MAX_MESSAGE", "MAX_REPORT", "MAX_UPLOAD", "PATCHES", "TYPING", "Hooks", "ServeError", "add_colours",
+    "add_reports", "add_upload", "data_html", "log_line", "restate", "start",
 ]  # fmt: skip
 
 

@@ -14,7 +14,7 @@ import viser
 from ..guard import data_html
 from ..state import ViewState
 from ..text import distance_text, say
-from . import compare, explore, flex, view
+from . import compare, data, explore, flex, view
 from .widgets import Change as Change
 from .widgets import Tell, Widgets
 
@@ -54,6 +54,8 @@ class Panel:
         act: Callable[[str], None],
         *,
         narrow: bool,
+        own: data.Does,
+        use_hint: Callable[[], None],
     ) -> None:
         self.widgets = w = Widgets(gui, tell, act)
         gui.set_panel_label(say("app.title"))
@@ -78,10 +80,12 @@ class Panel:
             view.build(w)
         with tabs.add_tab(say("panel.compare")):
             pins = compare.build(w)
-        spoken, data = gui.add_html(""), gui.add_html("")
+        with tabs.add_tab(say("panel.data")):
+            self.own = data.build(w, own, use_hint)
+        spoken, told = gui.add_html(""), gui.add_html("")
         gui.main_panel.dock_right()
         gui.main_panel.set_width(SIDE_WIDTH)
-        self.places = Places(style, *photo, cards, plots, legend, words, pins, spoken, data)
+        self.places = Places(style, *photo, cards, plots, legend, words, pins, spoken, told)
 
     @property
     def controls(self) -> tuple[viser.GuiInputHandle, ...]:
