@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import faceambig as fa
+import scenes
 from faceambig import compose as fc
 from faceambig.arrays import vertex_normals
 from faceambig.camera import Camera, depths, project
@@ -17,6 +18,7 @@ from faceambig.flex import plausible_limit
 from faceambig.model import Subject
 from faceambig.observation import portrait_camera
 from faceambig.posterior import DistanceDensity
+from faceambig.render import overlay
 from faceambig.scene import Lines, Photo, Scene
 from strategies import bumpy_model, face_of
 
@@ -496,3 +498,47 @@ def test_a_row_without_the_truth_is_the_fits_as_they_look():
     assert [(head.name, head.title) for head in scene.heads] == [("fit1", "a"), ("fit2", "b")]
     assert all(head.lit for head in scene.heads)
     assert abs(sum(head.slot for head in scene.heads)) < 1e-12
+
+
+# ---- as pictures ----
+
+LOOKS = {
+    "from_above": {"view": "top", "overlays": ("rays", "pyramid", "scale")},
+    "depth": {"view": "free", "orbit": (40.0, 15.0), "zoom": 1.5, "surface": "depth"},
+    "clay": {"view": "side", "surface": "clay", "overlays": ("points", "ghost", "rays", "outline")},
+}
+
+
+@pytest.fixture(scope="module")
+def posed(embedded: fa.FaceModel) -> tuple[Subject, fc.Face, Photo, Camera]:
+    scenes.need_renderer()
+    subject, pose = embedded.subject(2), {"distance": 0.3, "yaw_deg": 15}
+    seen, camera = fa.observe(subject, **pose), portrait_camera(subject, **pose)
+    face = fc.measure(subject, fa.fit(embedded, seen, distance=1.2))
+    return subject, face, fc.photo(subject, seen, camera, caption="taken from 30 cm"), camera
+
+
+@pytest.mark.gl
+@pytest.mark.parametrize("name", LOOKS)
+def test_a_look_is_like_the_stored_picture(posed, name):
+    subject, face, picture, camera = posed
+    scene = fc.compose(
+        subject, face, picture, titles=TITLES, true_camera=camera, note="person 2",
+        legend_words=("nearer to the camera, mm", "grey: not measured"), **LOOKS[name],
+    )  # fmt: skip
+    scenes.like_stored(f"look_{name}", overlay.draw(scene, 720, 450))
+
+
+@pytest.mark.gl
+def test_a_row_of_pins_is_like_the_stored_picture(posed):
+    subject, face, picture, _ = posed
+    other = fc.measure(subject, face.fit, alpha=0.5 * face.fit.alpha)
+    lines = tuple(
+        (("person 2", "dim"), (f"{f.d_l_percent:.2f} %", "d_l"), (f"{f.d_s_mm:.1f} mm", "d_s"))
+        for f in (face, other)
+    )
+    scene = fc.compose_pins(
+        [(subject, face), (subject, other)], picture, titles=("one", "another"), captions=lines,
+        legend_words=("distance to true face, mm", "grey: not measured"), note="two pins",
+    )  # fmt: skip
+    scenes.like_stored("pins", overlay.draw(scene, 640, 304))

@@ -10,8 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import scenes
-from faceambig.render import overlay, plots
+from faceambig.render import gauges, gl, marked, overlay, painter, plots
 from faceambig.render.canvas import Canvas
+from faceambig.render.sheet import GROUND, OBSERVED, PROJECTED, WORDS
 
 draws = pytest.mark.gl
 LAYOUTS = ("usual", "strip", "camera", "legend")
@@ -34,14 +35,15 @@ def canvases(monkeypatch):
             made.append(self)
 
     def nothing(head, view, width, height, pixels_per_metre, **options):
-        return np.zeros((height, width, 4), dtype=np.uint8)
+        front = np.full((height, width), -np.inf, dtype=np.float32)
+        return gl.Layer(np.zeros((height, width, 4), dtype=np.uint8), front)
 
     def blank(vertices, photo, focal, size, **options):
         return np.full((size[1], size[0], 3), 200, dtype=np.uint8)
 
     monkeypatch.setattr(overlay, "Canvas", Kept)
-    monkeypatch.setattr(overlay.painter, "paint", blank)
-    monkeypatch.setattr(overlay.gl, "render_head", nothing)
+    monkeypatch.setattr(painter, "paint", blank)
+    monkeypatch.setattr(gl, "render_layer", nothing)
     return made
 
 
@@ -109,7 +111,7 @@ def test_numbers_are_written_as_the_page_writes_them(canvases):
         "taken from 30 cm",
     } <= set(words)
     assert "50\u2009mm" in words
-    assert [overlay.percent(v) for v in (0.0, 0.0049, 0.994, 0.996, 1.04, 12.34)] == [
+    assert [gauges.percent(v) for v in (0.0, 0.0049, 0.994, 0.996, 1.04, 12.34)] == [
         "0.00", "0.00", "0.99", "1.0", "1.0", "12.3",
     ]  # fmt: skip
     assert [plots.centimetres(v) for v in (0.2, 0.3149, 1.2, 1.216, 3.0, 12.0)] == [
@@ -120,8 +122,8 @@ def test_numbers_are_written_as_the_page_writes_them(canvases):
 def test_what_is_not_good_is_said(canvases):
     scene = scenes.scene()
     for numbers, expected in (
-        (replace(scene.numbers, converged=False), overlay.WORDS["not_converged"]),
-        (replace(scene.numbers, plausible=False), overlay.WORDS["implausible"]),
+        (replace(scene.numbers, converged=False), WORDS["not_converged"]),
+        (replace(scene.numbers, plausible=False), WORDS["implausible"]),
         (
             replace(scene.numbers, flex_words="nose forward", flex_mm=4.0),
             "nose forward: +4.0\u2009mm",
@@ -133,10 +135,73 @@ def test_what_is_not_good_is_said(canvases):
             assert overlapping(canvases[-1]) == []
 
 
+def test_several_modes_are_said_below_each_other(canvases):
+    scene = scenes.scene()
+    flex = (("nose forward, ears back", 4.0), ("jaw wider", -2.5), ("brows up, mouth down", 1.0))
+    numbers = replace(scene.numbers, flex=flex, flex_words=flex[0][0], flex_mm=4.0)
+    for through in (False, True):
+        overlay.draw(replace(scene, numbers=numbers, through_camera=through, note=30 * "words "))
+        words = words_of(canvases[-1])
+        assert [f"{part}: {mm:+.1f}\u2009mm" in words for part, mm in flex] == [True] * 3
+        assert overlapping(canvases[-1]) == []
+
+
+def test_what_is_hidden_is_not_written(canvases):
+    scene = scenes.scene()
+    overlay.draw(replace(scene, hide=frozenset({"truth"})))
+    words = set(words_of(canvases[-1]))
+    assert "0.25" in words
+    assert not words & {"5.3", WORDS["d_s"], WORDS["d_s_axis"]}
+    overlay.draw(replace(scene, hide=frozenset({"numbers"})))
+    assert not set(words_of(canvases[-1])) & {"5.3", "0.25"}
+    unknown = replace(scenes.curves(), true_distance=np.nan)
+    overlay.draw(replace(scene, curves=unknown))
+    assert "true 30" not in words_of(canvases[-1])
+    assert "assumed 120" in words_of(canvases[-1])
+
+
+def test_a_reference_in_place_of_the_true_face_is_named(canvases):
+    scene = scenes.scene()
+    numbers = replace(scene.numbers, reference="the 60 cm fit")
+    overlay.draw(replace(scene, numbers=numbers))
+    written = " ".join(words_of(canvases[-1]))
+    assert "mean distance to the 60 cm fit" in written
+    assert WORDS["d_s_note"] not in written
+
+
+@pytest.mark.parametrize("strip", [False, True])
+def test_open_ends_of_a_scale_are_written_at_its_bar(canvases, strip):
+    scale = replace(scenes.legend(), low=-15.0, ticks=(-15.0, -5.0, 5.0, 15.0), open_low=True)
+    scene = replace(scenes.strip() if strip else scenes.scene(), legend=scale)
+    overlay.draw(scene)
+    assert {"<\u2009\u221215", "\u22125", "5", "15"} <= set(words_of(canvases[-1]))
+    overlay.draw(replace(scene, legend=replace(scale, open_high=True)))
+    assert ">\u200915" in words_of(canvases[-1])
+    assert overlapping(canvases[-1]) == []
+
+
+@pytest.mark.parametrize("distance", [0.2, 0.3, 3.0, None])
+@pytest.mark.parametrize("hide", [(), ("truth",)])
+def test_a_density_is_a_plot_of_its_own_below_the_others(canvases, distance, hide):
+    sweep = scenes.curves()
+    told = replace(
+        sweep, density=1.0 / sweep.distances / 5.0, intervals=((0.2, np.inf),), beyond=0.4
+    )
+    numbers = replace(scenes.scene().numbers, converged=False)
+    scene = replace(scenes.scene(distance, curves=told, hide=frozenset(hide)), numbers=numbers)
+    overlay.draw(scene)
+    assert {WORDS["density"], "40\u2009% farther"} <= set(words_of(canvases[-1]))
+    assert overlapping(canvases[-1]) == []
+    high = plots.height(told, hide) - plots.height(sweep, hide)
+    assert high == plots.DENSITY_ROOM
+    bottom = max(y + tall for _, _, y, _, tall in canvases[-1].boxes)
+    assert bottom <= canvases[-1].room[1]
+
+
 def test_words_can_be_replaced(canvases):
     overlay.draw(scenes.scene(), words={"d_l": "Abstand der Punkte"})
     assert "Abstand der Punkte" in words_of(canvases[0])
-    assert overlay.WORDS["d_s"] in words_of(canvases[0])
+    assert WORDS["d_s"] in words_of(canvases[0])
 
 
 @pytest.mark.parametrize("size", [(100, 900), (1440, 20000), (0, 900)])
@@ -149,8 +214,8 @@ def test_marks_stand_where_the_points_are():
     at, step = np.array([31, 17]), 0.7
     points = np.array([[40.3, 55.9], [120.0, 90.5]])
     photo = replace(scenes.photo(), observed=points[:1], projected=points[1:])
-    canvas = Canvas((160, 120), 1.0, overlay.GROUND)
-    overlay.marks(canvas, at, step, photo, 5.0)
+    canvas = Canvas((160, 120), 1.0, GROUND)
+    marked.marks(canvas, at, step, photo, 5.0)
     pixels = canvas.pixels.astype(float)
     rows, columns = np.indices(pixels.shape[:2])
     for point, channels in ((points[0], (0, 2)), (points[1], (2, 0))):
@@ -167,10 +232,10 @@ def test_a_circle_lies_over_its_cross_and_both_on_white():
     point = np.array([[50.0, 50.0]])
     photo = replace(scenes.photo(), observed=point, projected=point)
     canvas = Canvas((100, 100), 1.0, (10, 10, 10))
-    overlay.marks(canvas, np.zeros(2), 1.0, photo, 10.0)
+    marked.marks(canvas, np.zeros(2), 1.0, photo, 10.0)
     ring, middle, halo = canvas.pixels[50, 60], canvas.pixels[50, 50], canvas.pixels[50, 62]
-    assert np.abs(ring.astype(int) - overlay.PROJECTED).max() < 40
-    assert np.abs(middle.astype(int) - overlay.OBSERVED).max() < 40
+    assert np.abs(ring.astype(int) - PROJECTED).max() < 40
+    assert np.abs(middle.astype(int) - OBSERVED).max() < 40
     assert halo.min() > 200
 
 
@@ -179,9 +244,9 @@ def test_missing_points_are_left_out():
     nothing = replace(
         photo, observed=np.full_like(photo.observed, np.nan), projected=np.zeros((0, 2))
     )
-    canvas = Canvas((100, 100), 1.0, overlay.GROUND)
-    overlay.marks(canvas, np.zeros(2), 0.2, nothing, 4.0)
-    assert (canvas.pixels == overlay.GROUND).all()
+    canvas = Canvas((100, 100), 1.0, GROUND)
+    marked.marks(canvas, np.zeros(2), 0.2, nothing, 4.0)
+    assert (canvas.pixels == GROUND).all()
 
 
 @given(
@@ -214,7 +279,7 @@ def test_a_transparent_picture_over_the_ground_is_the_opaque_one(canvases):
     opaque = overlay.draw(scene, 800, 380)
     assert (over[0, 0] == 0).all()
     alpha = over[..., 3:] / 255
-    shown = over[..., :3] * alpha + np.array(overlay.GROUND) * (1 - alpha)
+    shown = over[..., :3] * alpha + np.array(GROUND) * (1 - alpha)
     assert np.abs(shown - opaque[..., :3]).max() <= 3  # two roundings, divided by alpha
 
 

@@ -17,8 +17,8 @@ ROOT = Path(__file__).parent.parent
 KEPT = {
     "AssetError", "ContourFit", "ContourStatus", "DistanceDensity", "DistanceInterval", "FaceModel", "FaceSamples",
     "Fit", "FitOptions", "FlexibilityModes", "Interval", "Observation", "Posterior", "Scheme", "Status", "Subject",
-    "Sweep", "condition", "contour_fit", "fit", "flexibility_modes", "load_landmarks", "load_model", "observe",
-    "posterior", "sweep_distance",
+    "Sweep", "condition", "contour_fit", "fit", "flexibility_modes", "load_fit", "load_landmarks", "load_model",
+    "observe", "posterior", "save_fit", "sweep_distance",
 }  # fmt: skip
 MEMBERS = {
     fa.FaceModel: {"faces", "mean", "n_modes", "n_vertices", "scheme", "subject", "truncate", "vertices"},
@@ -159,7 +159,10 @@ def test_page_and_snapshot_are_importable_by_their_names():
         _ = faceambig_app.nothing
 
 
-@pytest.mark.parametrize("arguments", [[], ["snapshot"], ["fit"], ["sweep"], ["models"], ["serve"]])
+@pytest.mark.parametrize(
+    "arguments",
+    [[], ["snapshot"], ["fit"], ["sweep"], ["modes"], ["posterior"], ["models"], ["serve"]],
+)
 def test_help_is_printed_without_loading_anything_heavy(arguments):
     # 17 ms instead of a second: numpy, viser, cv2 and pyrender come only with the work
     code = (

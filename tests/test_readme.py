@@ -24,7 +24,9 @@ def test_its_commands_exist():
     from faceambig_app.cli import parser
 
     commands = re.findall(r"^faceambig (\w+)", README, re.MULTILINE)
-    assert set(commands) == {"serve", "snapshot", "fit", "sweep", "landmarks", "models"}
+    assert set(commands) == {
+        "serve", "snapshot", "animate", "fit", "sweep", "modes", "posterior", "landmarks", "models",
+    }  # fmt: skip
     for line in re.findall(r"^faceambig (.+?)(?:\s+#.*)?$", README, re.MULTILINE):
         parser().parse_args(line.split())
 

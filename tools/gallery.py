@@ -27,8 +27,10 @@ from faceambig.io.pictures import canny_edges, read_picture
 from faceambig.observation import portrait_camera
 from faceambig.render import painter
 from faceambig.render.canvas import Canvas
-from faceambig.render.overlay import PROJECTED, encode_png, marks
+from faceambig.render.marked import marks
+from faceambig.render.overlay import encode_png
 from faceambig.render.plots import DIM, INK
+from faceambig.render.sheet import PROJECTED
 from faceambig.texture import sample_texture
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"

@@ -16,6 +16,7 @@ from .viewer import Sight
 
 TONES = {"seen": (200, 16, 46), "d_l": (27, 95, 193), "dim": (120, 134, 148)}
 CROSS, DISC = 4.5, 8.0  # pixels: half a cross, a whole disc
+LARGEST = {"seen": 0.0034, "d_l": 0.006}  # metres: on a phone, where heads are small, marks are too
 LIFT = {"d_l": 0.002, "seen": 0.003}  # metres towards the viewer: crosses over discs
 BESIDE = 6.0  # pixels from a point to its name
 NAME_LIFT = 0.015  # metres more: a name is wide, and the cheek beside it may be nearer
@@ -66,7 +67,7 @@ class PointNodes:
             self._draw_discs(sight)
 
     def _draw_crosses(self, sight: Sight) -> None:
-        right, up = CROSS * sight.pixel * sight.board[:, :2].T
+        right, up = min(CROSS * sight.pixel, LARGEST["seen"]) * sight.board[:, :2].T
         arms = np.array([[-right - up, right + up], [-right + up, right - up]])
         segments = (self._points[:, None, None, :] + arms).reshape(-1, 2, 3).astype(np.float32)
         if self._crosses is None:
@@ -85,7 +86,8 @@ class PointNodes:
                 point_shading="flat", precision="float32",  # half floats have steps of 0.1 mm here
             )  # fmt: skip
         self._discs.points = points
-        self._discs.point_size = 0.5 * DISC * sight.pixel  # viser draws points twice as wide
+        # Half: viser draws points twice as wide
+        self._discs.point_size = 0.5 * min(DISC * sight.pixel, LARGEST["d_l"])
 
     def _name(self, names: tuple[str, ...], sight: Sight) -> None:
         while len(self._words) > len(names):

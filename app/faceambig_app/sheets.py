@@ -22,8 +22,8 @@ from .text import centimetres, percent_number, say
 
 Pixels = NDArray[np.uint8]
 Reference = Literal["true", "best", "saved"]  # the face that those of a sweep are compared with
-SWEEP, POSTERIOR = (960, 720), (1480, 760)  # pixels
-HEADS = 520  # pixels, of the posterior's: the heat map
+SWEEP, POSTERIOR = (960, 720), (1580, 760)  # pixels
+HEADS = 620  # pixels, of the posterior's: the heat map
 CELL = 250  # pixels, of a face in a row
 MARGIN = 28
 ACROSS = 0.29  # metres: a head from the side
@@ -68,7 +68,7 @@ def faces_sheet(fit: fa.Fit, faces: Sequence[Bent], note: str) -> Pixels:
                 slot=slots[k], caption=tuple(caption), lit=False,
             )
         )  # fmt: skip
-    scene = _scene(fit, heads, _legend(say("sheet.legend"), most), note)
+    scene = _scene(fit, heads, _legend(say("sheet.legend"), most, model.evaluation is None), note)
     return draw(scene, max(1600, CELL * len(heads) + 200), 760)
 
 
@@ -132,12 +132,8 @@ def posterior_sheet(
     canvas.text(MARGIN, MARGIN + 12, say("sheet.posterior"), 19, INK, 650)
     line = MARGIN + 42
     for each, colour in zip(intervals, charts.WITHIN, strict=True):
-        high = say("sheet.no_end") if each.high is None else centimetres(each.high)
-        said = say(
-            "sheet.interval", level=f"{100 * each.level:g}", low=centimetres(each.low), high=high
-        )
+        canvas.text(MARGIN + 24, line, _interval(each), 15, INK)
         canvas.fill(MARGIN, line - 12, 15, 15, colour)
-        canvas.text(MARGIN + 24, line, said, 15, INK)
         line += 25
     charts.density(
         canvas, density.distances, np.log(2.0) * density.density, ends, density.beyond, words,
@@ -166,7 +162,7 @@ def _spread(canvas: Canvas, found: fa.Posterior, sd_mm: Array, x: float) -> None
         middle = gl.viewer_rotation(view) @ pivot(model)
         drawn = gl.render_head(face, view, *size, ppm, middle=(middle[0], middle[1]))
         canvas.paste(x + k * size[0], top, drawn)
-    legend, y = _legend(say("sheet.legend_sd"), most), top + size[1] + 42
+    legend, y = _legend(say("sheet.legend_sd"), most, model.evaluation is None), top + size[1] + 42
     canvas.text(x, y - 14, legend.title, 13, DIM)
     canvas.ramp(x, y - 5, 300, 14, legend.colours, upright=False)
     for tick in legend.ticks:
@@ -218,15 +214,22 @@ def _scale_end(mm: float) -> float:
     return float(power * next(step for step in (1, 1.5, 2, 3, 4, 6, 8, 10) if step * power >= mm))
 
 
-def _legend(title: str, most: float) -> Legend:
+def _legend(title: str, most: float, everywhere: bool) -> Legend:
     return Legend(
         title=title,
         colours=scale_colours(np.linspace(0.0, 1.0, 64)),
         low=0.0,
         high=most,
         ticks=tuple(round(share * most, 6) for share in (0.0, 0.5, 1.0)),
-        note=say("legend.unmeasured"),
+        note="" if everywhere else say("legend.unmeasured"),
     )
+
+
+def _interval(each: fa.DistanceInterval) -> str:
+    level, low = f"{100 * each.level:g}", centimetres(each.low)
+    if each.high is None:
+        return say("sheet.open", level=level, low=low)
+    return say("sheet.interval", level=level, low=low, high=centimetres(each.high))
 
 
 def _error(d_l_percent: float) -> str:
@@ -238,7 +241,7 @@ def _true(metres: float) -> str:
 
 
 def _signed(value: float) -> str:
-    return f"{value:+.3g}".replace("-", "\u2212")
+    return f"{value:+.2g}".replace("-", "\u2212")
 
 
 def _opaque(canvas: Canvas) -> Pixels:

@@ -65,6 +65,7 @@ function hear({ data }) {
       if (type === "GuiHtmlMessage") htmls.add(uuid);
       if (htmls.has(uuid)) readContent(props?.content ?? updates?.content);
     }
+    watchScene(); // it may have come without a change of the document
   } else if (data?.type === "connected" || data?.type === "closed") {
     socket = data.type === "connected" ? this : null;
     reports = null; // of the next connection: another one

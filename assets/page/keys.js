@@ -31,7 +31,7 @@ const onEscape = [];
 window.addEventListener(
   "keydown",
   (event) => {
-    if (event.key !== "Escape" || document.querySelector(ABOVE)) return;
+    if (event.key !== "Escape" || [...document.querySelectorAll(ABOVE)].some((one) => one.getClientRects().length)) return;
     for (const end of onEscape) end();
     report("key", "Escape");
   },

@@ -27,9 +27,9 @@ const before = { ...look }; // as kept: what "hello" tells
 choose({ theme: asked.get("theme"), text: Number(asked.get("text") ?? NaN) });
 
 window.__faceambig = {
-  dark() {
-    if (asked.has("darkMode")) return true;
-    return !themed && (look.theme === "dark" || (look.theme !== "light" && system.matches));
+  dark(server) {
+    if (themed) return server;
+    return look.theme === "dark" || (look.theme !== "light" && system.matches);
   },
 };
 
@@ -86,7 +86,7 @@ style.textContent = `
   .fa-status { position: fixed; top: 8px; left: 50%; transform: translateX(-50%); z-index: 1000; max-width: 90vw;
     padding: 6px 14px; border-radius: 8px; background: #1d2733; color: #fff; font: 14px/1.45 system-ui, sans-serif;
     pointer-events: none; }
-  .fa-status:empty { display: none; }
+  .fa-status:empty { padding: 0; }
   .fa-loupe { position: fixed; z-index: 1000; width: 126px; height: 126px; border-radius: 50%; pointer-events: none;
     border: 2px solid #fff; box-shadow: 0 0 0 1px #1d2733; background-repeat: no-repeat; background-color: #cbd5e0; }
   .fa-loupe::before, .fa-loupe::after { content: ""; position: absolute; background: #c8102e; outline: 1px solid #fffc; }

@@ -89,6 +89,9 @@ function readPhoto() {
   // What is asked for, and the photograph below it: on a telephone the button that began this is a page below
   if (asks && !asking) document.querySelector("[data-fa-ask]")?.scrollIntoView({ block: "nearest" });
   asking = asks;
+  for (const index of moved.keys()) {
+    if (index !== drag?.index && !pointOf(index)) moved.delete(index);
+  }
   for (const point of document.querySelectorAll("[data-fa-photo] [data-fa-point]")) {
     if (known.has(point)) continue;
     known.add(point);

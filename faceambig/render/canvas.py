@@ -46,10 +46,12 @@ class Canvas:
         *,
         anchor: str = "start",
         most: float | None = None,
+        halo: Colour | None = None,
     ) -> float:
         """Write on the base line y, `anchor` (start, middle, end) at x; returns the end that is not at x.
 
-        Wider than `most` units the words are made smaller, then cut with dots. weight: 400 regular, 700 bold.
+        Wider than `most` units the words are made smaller, then cut with dots. weight: 400 regular, 700 bold. halo:
+        of a colour around the letters, for words on a picture.
         """
         text = text.replace("\u202f", THIN)
         if most is not None:
@@ -67,6 +69,14 @@ class Canvas:
                 org = (place(start)[0] + 8) // 16
                 cv2.putText(mask, text, org.tolist(), 255, self._font, self._size(size), weight)
 
+            def around(mask: Picture, place: Place) -> None:
+                letters(mask, place)
+                wide = 2 * round(FINE * self.unit) + 1
+                disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (wide, wide))
+                cv2.dilate(mask, disc, mask)
+
+            if halo is not None:
+                self.ink(halo, box, 2 * self.unit, around)
             self.ink(colour, box, self.unit, letters)
             self.boxes.append((text, left, y - 0.8 * size, wide, size))
         return left if anchor == "end" else left + wide
@@ -198,6 +208,15 @@ class Canvas:
             cv2.polylines(mask, [place(piece) for piece in pieces], False, 255, thick, shift=4)
 
         self.ink(colour, points, width * self.unit, strokes)
+
+    def area(self, x: Array, y: Array, colour: Colour) -> None:
+        """What a closed line through points surrounds."""
+        points = np.stack([x, y], axis=1) * self.unit
+
+        def inside(mask: Picture, place: Place) -> None:
+            cv2.fillPoly(mask, [place(points)], 255, shift=4)
+
+        self.ink(colour, points, 0.0, inside)
 
     def circle(
         self, at: tuple[float, float], radius: float, colour: Colour, width: float = 0.0

@@ -17,8 +17,9 @@ from ..arrays import Array
 from ..scene import Photo
 from . import painter
 from .canvas import FINE, Canvas, Picture, Place
-from .overlay import HALO, OBSERVED, PROJECTED, marks
+from .marked import marks
 from .plots import DIM, INK
+from .sheet import HALO, OBSERVED, PROJECTED
 
 ROOM = 0.22  # around the face, as a share of its longer side
 PANEL = 760  # pixels of a panel's longer side

@@ -91,6 +91,13 @@ def viewer_rotation(view: View) -> Array:
     return np.array([right, up, towards])
 
 
+class Layer(NamedTuple):
+    """One head as a picture, and how near it is."""
+
+    rgba: NDArray[np.uint8]  # (H, W, 4), alpha not premultiplied
+    front: NDArray[np.float32]  # (H, W) metres from the head's origin to the viewer; -inf: nothing
+
+
 class Mesh(NamedTuple):
     """What the render thread is given. V vertices, F triangles, viewer axes."""
 
@@ -116,6 +123,22 @@ def render_head(
     middle: the point of the picture's middle, metres along the viewer's right and up from the head's origin. Parallel
     rays: one scale in the whole picture. marked: vertices that get a bead. NoRendererError where nothing can draw.
     """
+    return render_layer(
+        head, view, width, height, pixels_per_metre, middle=middle, marked=marked
+    ).rgba
+
+
+def render_layer(
+    head: Head,
+    view: View,
+    width: int,
+    height: int,
+    pixels_per_metre: float,
+    *,
+    middle: tuple[float, float] = (0.0, 0.0),
+    marked: IntArray | None = None,
+) -> Layer:
+    """As `render_head`, with the depth of every pixel: for what stands in the same place."""
     R = viewer_rotation(view)
     points = head.vertices @ R.T
     points[:, :2] -= middle
@@ -127,8 +150,10 @@ def render_head(
     factor = 2 if 4 * width * height <= LARGEST else 1
     size = (factor * width, factor * height)
     half = (width / (2 * pixels_per_metre), height / (2 * pixels_per_metre))
-    large = _studio().call(lambda pyrender, renderer: _frame(pyrender, renderer, mesh, half, size))
-    return _reduced(large, factor)
+    large, depth = _studio().call(
+        lambda pyrender, renderer: _frame(pyrender, renderer, mesh, half, size)
+    )
+    return Layer(_reduced(large, factor), _front(depth, factor))
 
 
 def _lit_colours(head: Head, normals: Array) -> Array:
@@ -199,13 +224,24 @@ def _reduced(large: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:
     return np.concatenate([colour, alpha], axis=2).clip(0, 255).round().astype(np.uint8)
 
 
+def _front(depth: NDArray[np.float32], factor: int) -> NDArray[np.float32]:
+    """(H, W) metres towards the viewer of the nearest sample of each pixel, -inf where there is none."""
+    height, width = depth.shape[0] // factor, depth.shape[1] // factor
+    samples = depth.reshape(height, factor, width, factor)
+    nothing = samples == 0
+    # pyrender undoes the depth of a perspective camera; that of parallel rays is linear in the buffer
+    buffer = FAR + NEAR - 2 * NEAR * FAR / np.where(nothing, FAR, samples)
+    front = EYE - NEAR - 0.5 * (buffer + FAR - NEAR)
+    return np.where(nothing, -np.inf, front).max(axis=(1, 3)).astype(np.float32)
+
+
 def _frame(
     pyrender: Any, renderer: Any, mesh: Mesh, half: tuple[float, float], size: tuple[int, int]
-) -> NDArray[np.uint8]:
-    """(H, W, 4) RGBA of a mesh, straight from the frame buffer. Runs in the render thread."""
+) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+    """(H, W, 4) RGBA and (H, W) depth of a mesh, straight from the frame buffer. Runs in the render thread."""
     renderer.viewport_width, renderer.viewport_height = size
     flags = pyrender.RenderFlags.RGBA | (0 if mesh.lit else pyrender.RenderFlags.FLAT)
-    return renderer.render(_scene(pyrender, mesh, half), flags=flags)[0]
+    return renderer.render(_scene(pyrender, mesh, half), flags=flags)
 
 
 def _scene(pyrender: Any, mesh: Mesh, half: tuple[float, float]) -> Any:

@@ -9,60 +9,23 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
-from ..arrays import Array
-from ..scene import Head, Legend, Photo, Scene, View
-from . import gl, painter, plots
-from .canvas import FINE, THIN, Canvas, Colour, Picture, Place
-from .plots import D_L, D_S, DIM, INK, LINE
-
-GROUND, PANEL, CARD = (0xF3, 0xF6, 0xF9), (0xFF, 0xFF, 0xFF), (0xF6, 0xF8, 0xFA)
-OBSERVED, PROJECTED, HALO = (0xC8, 0x10, 0x2E), (0x1B, 0x5F, 0xC1), (0xFF, 0xFF, 0xFF)
-TONES: Mapping[str, Colour] = {"dim": DIM, "d_l": D_L, "d_s": D_S}
+from ..scene import Scene
+from . import gauges, plots
+from .canvas import Canvas, Colour, Picture
+from .gauges import CARD_HEIGHT
+from .heads import places, standing
+from .marked import photograph
+from .plots import DIM, INK, LINE
+from .sheet import GROUND, PANEL, TONES, WORDS, Pictures, Sheet
 
 USUAL, STRIP = (1440, 900), (1600, 760)  # default sizes, and the least room of a layout
 SMALLEST, LARGEST = 160, 16384  # pixels of a side
-MARGIN, COLUMN, CARD_HEIGHT = 18, 338, 122  # units; a column is what stands beside the heads
-HEAD_WIDTH = 0.228  # metres across most heads, seen from any side: the room each is given
-ROW_HEIGHT = 1.72  # times a view's half height: the room a head is given from top to bottom
-
-WORDS: Mapping[str, str] = {
-    "photo": "The photograph",
-    "cross": "point in the photo",
-    "circle": "same point of the fitted face",
-    "assumed": "assumed {cm}",
-    "true": "true {cm}",
-    "far": "assumed far away (orthographic)",
-    "far_tick": "far",
-    "d_l": "Landmark error",
-    "d_l_note": "of the eye distance; people click within {tolerance}\u202f%.",
-    "d_l_note_alone": "of the eye distance",
-    "d_s": "Surface difference",
-    "d_s_note": "mean distance to the true face",
-    "d_l_axis": "Landmark error in %",
-    "d_s_axis": "Surface difference in mm",
-    "axis": "assumed camera distance in cm",
-    "band": "under {tolerance}\u202f%: a person cannot tell",
-    "not_converged": "No good fit here; the last step is shown.",
-    "implausible": "no longer a plausible face",
-    "bar": "{mm}\u202fmm",
-    "bar_all": "{mm}\u202fmm, all views",
-}
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Sheet:
-    """What every part of a picture draws with."""
-
-    canvas: Canvas
-    scene: Scene
-    words: Mapping[str, str]
-    panel: Colour  # behind what stands beside the heads
-    pictures: dict[object, Picture]  # heads and photographs: drawn once, whatever is behind them
+MARGIN, COLUMN = 18, 338  # units; a column is what stands beside the heads
+HEAD_WIDTH = 0.228 / 0.165  # times a view's half height: the room a head is given across, and
+ROW_HEIGHT = 1.72  # from top to bottom
 
 
 def draw(
@@ -72,15 +35,17 @@ def draw(
     *,
     scale: float = 1.0,
     transparent: bool = False,
+    overlays: bool = True,
     words: Mapping[str, str] = WORDS,
 ) -> Picture:
     """(H, W, 4) RGBA picture of a scene, H = scale * height and W = scale * width.
 
     width, height: pixels at scale 1; by default 1440 x 900, a strip 1600 x 760. transparent: nothing behind heads
-    and words. words: replaces some of WORDS. ValueError for a size out of range, NoRendererError where heads are to
-    be drawn and there is no OpenGL.
+    and words. overlays: False leaves out all words, marks, lines, numbers and scales: the heads alone, or, through
+    the camera, both photographs. words: replaces some of WORDS. ValueError for a size out of range, NoRendererError
+    where heads are to be drawn and there is no OpenGL.
     """
-    layout, least = _layout(scene)
+    layout, least = _layout(scene) if overlays else (_bare, _layout(scene)[1])
     asked = (least[0] if width is None else width, least[1] if height is None else height)
     size = (round(scale * asked[0]), round(scale * asked[1]))
     for name, side in zip(("width", "height"), size, strict=True):
@@ -88,10 +53,11 @@ def draw(
             raise ValueError(f"{name}: {side} pixels, expected {SMALLEST} to {LARGEST}")
     unit = min(size[0] / least[0], size[1] / least[1])
     words = {**WORDS, **words}
-    pictures: dict[object, Picture] = {}
+    pictures = Pictures()
 
     def drawn(ground: Colour, panel: Colour) -> Picture:
-        sheet = Sheet(Canvas(size, unit, ground), scene, words, panel, pictures)
+        canvas = Canvas(size, unit, ground)
+        sheet = Sheet(canvas, scene, words, panel, pictures, bare=not overlays)
         layout(sheet)
         return sheet.canvas.pixels
 
@@ -120,7 +86,7 @@ def _layout(scene: Scene) -> tuple[Callable[[Sheet], None], tuple[int, int]]:
     """What lays the scene out, and the least room it needs."""
     if scene.through_camera:
         return _through_camera, USUAL
-    if len(scene.views) > 1 or len(scene.heads) > 2:
+    if len(scene.views) > 1 or len({head.slot for head in scene.heads}) > 2:
         return _strip, STRIP
     return _usual, USUAL
 
@@ -148,46 +114,54 @@ def _usual(sheet: Sheet) -> None:
     y = (height - tall) / 2 - 6
     canvas.text(MARGIN, y - 14, sheet.words["photo"], 15, INK, 650)
     canvas.text(MARGIN + COLUMN, y - 14, scene.photo.caption, 13.5, DIM, anchor="end")
-    _photo(sheet, MARGIN, y, COLUMN)
-    _key(sheet, MARGIN, y + tall + 24, COLUMN)
+    photograph(sheet, MARGIN, y, COLUMN)
+    gauges.key(sheet, MARGIN, y + tall + 24, COLUMN)
     _heads(sheet, panel, width - 2 * panel)
-    x = width - panel + MARGIN
-    warning = _warning(sheet)
-    warned = 26 if warning else 0
-    block = CARD_HEIGHT + warned + (38 + plots.HEIGHT if scene.curves is not None else 0)
-    y = (height - block) / 2
-    _cards(sheet, x, y, COLUMN)
-    if warning:
-        canvas.text(x, y + CARD_HEIGHT + 26, *warning, most=COLUMN)
+    _numbers(sheet, width - panel + MARGIN)
+
+
+def _numbers(sheet: Sheet, x: float) -> None:
+    """The column of numbers, warnings and curves, in the middle of the picture's height."""
+    scene = sheet.scene
+    tall = 0.0 if "numbers" in scene.hide else CARD_HEIGHT
+    plotted = 0.0 if scene.curves is None else 38 + plots.height(scene.curves, scene.hide)
+    y = (sheet.canvas.room[1] - tall - gauges.warned(sheet) - plotted) / 2
+    gauges.cards(sheet, x, y, COLUMN)
+    y += tall + gauges.warn(sheet, x, y + tall, COLUMN)
     if scene.curves is not None:
-        y += CARD_HEIGHT + warned + 38
-        plots.curves(canvas, scene.curves, scene.numbers, sheet.words, x, y, COLUMN)
+        plots.curves(
+            sheet.canvas, scene.curves, scene.numbers, sheet.words, x, y + 38, COLUMN,
+            hide=scene.hide,
+        )  # fmt: skip
 
 
 def _heads(sheet: Sheet, x: float, width: float) -> None:
-    """One or two heads, titles above, scale bar and legend below."""
+    """One or two places of heads, titles above, scale bar and legend below."""
     canvas, scene = sheet.canvas, sheet.scene
     height = canvas.room[1]
-    view = scene.views[0]
-    cell = (width - 2 * MARGIN) / max(2, len(scene.heads))
-    ppm = min(cell / HEAD_WIDTH, (height - 230) / (ROW_HEIGHT * view.half_height))
+    view, rows = scene.views[0], places(sheet)
+    cell = (width - 2 * MARGIN) / max(2, len(rows))
+    most = height - 230
+    ppm = min(cell / HEAD_WIDTH, most / ROW_HEIGHT) / view.half_height
     tall = ROW_HEIGHT * view.half_height * ppm
     top = (height - tall) / 2 - 6
-    left = x + (width - cell * len(scene.heads)) / 2
-    for index, head in enumerate(scene.heads):
+    left = x + (width - cell * len(rows)) / 2
+    for index, heads in enumerate(rows):
         middle = left + (index + 0.5) * cell
-        _head(sheet, head, view, (middle, top + tall / 2), (cell, tall), ppm)
-        lines = head.caption or ((_assumed(sheet, index), "dim"),)
+        standing(sheet, heads, view, (middle, top + tall / 2), (cell, tall), ppm)
+        lines = gauges.under(sheet, heads)
         start = top - 18 - 20 * len(lines)
-        canvas.text(middle, start, head.title, 18, INK, 650, anchor="middle", most=cell - 8)
+        title = gauges.title(heads)
+        room = cell - 8 if len(rows) > 1 else width - 2 * MARGIN
+        canvas.text(middle, start, title, 18, INK, 650, anchor="middle", most=room)
         for row, (line, tone) in enumerate(lines, start=1):
             canvas.text(
                 middle, start + 2 + 20 * row, line, 14, TONES[tone], anchor="middle", most=cell - 8
             )
     below = top + tall + 44
-    _bar(sheet, x + MARGIN + 4, below, ppm, "bar")
+    gauges.bar(sheet, x + MARGIN + 4, below, ppm, "bar")
     if scene.legend is not None:
-        _legend_across(canvas, scene.legend, x + width - MARGIN - 10, below)
+        gauges.legend_across(canvas, scene.legend, x + width - MARGIN - 10, below)
     canvas.text(
         x + width / 2, height - 20, scene.note, 12.5, DIM, anchor="middle", most=width - 2 * MARGIN
     )
@@ -200,24 +174,31 @@ def _strip(sheet: Sheet) -> None:
     beside = 176 if scene.legend is not None else MARGIN
     lines = max(len(head.caption) for head in scene.heads)
     top, bottom = 58, 56 + 22 * lines
-    cell = (width - MARGIN - beside) / len(scene.heads)
+    rows = places(sheet)
+    cell = (width - MARGIN - beside) / len(rows)
     tall = (height - top - bottom) / len(scene.views)
-    ppm = min(cell / HEAD_WIDTH, *(tall / (ROW_HEIGHT * view.half_height) for view in scene.views))
-    for index, head in enumerate(scene.heads):
+    ppm = _scale(scene, cell, tall)
+    for index, heads in enumerate(rows):
         middle = MARGIN + (index + 0.5) * cell
-        canvas.text(middle, 38, head.title, 19, INK, 650, anchor="middle", most=cell - 8)
+        canvas.text(middle, 38, gauges.title(heads), 19, INK, 650, anchor="middle", most=cell - 8)
         for row, view in enumerate(scene.views):
-            _head(sheet, head, view, (middle, top + (row + 0.5) * tall), (cell, tall), ppm)
-        for row, (line, tone) in enumerate(head.caption):
+            standing(sheet, heads, view, (middle, top + (row + 0.5) * tall), (cell, tall), ppm)
+        for row, (line, tone) in enumerate(line for head in heads for line in head.caption):
             y = height - bottom + 22 + 22 * row
             canvas.text(middle, y, line, 15, TONES[tone], anchor="middle", most=cell - 6)
     if scene.legend is not None:
         area = height - top - bottom
-        _legend_beside(canvas, scene.legend, width - beside + 40, top + 22, area - 44)
+        gauges.legend_beside(canvas, scene.legend, width - beside + 40, top + 22, area - 44)
     key = "bar_all" if len(scene.views) > 1 else "bar"
-    end = _bar(sheet, MARGIN, height - 24, ppm, key, beside=True)
+    end = gauges.bar(sheet, MARGIN, height - 24, ppm, key, beside=True)
     most = width - MARGIN - end - 40
     canvas.text(width - MARGIN, height - 19, scene.note, 13, DIM, anchor="end", most=most)
+
+
+def _scale(scene: Scene, cell: float, tall: float) -> float:
+    """Units for a metre: every view of a head has room in a cell of this size, and all have one scale."""
+    largest = max(view.half_height for view in scene.views)
+    return min(cell / HEAD_WIDTH, tall / ROW_HEIGHT) / largest
 
 
 def _through_camera(sheet: Sheet) -> None:
@@ -230,204 +211,38 @@ def _through_camera(sheet: Sheet) -> None:
     side = min((width - 2 * MARGIN - gap) / 2, (height - 84 - CARD_HEIGHT - 40) / share)
     top, tall = 84, side * share
     left = (width - 2 * side - gap) / 2
-    titles = [head.title for head in scene.heads] + ["", ""]
+    titles = {head.name: head.title for head in scene.heads}
     columns = (
-        (left, titles[0], scene.photo.caption),
-        (left + side + gap, titles[1], _assumed(sheet, 1)),
+        (left, titles.get("true", sheet.words["photo"]), scene.photo.caption),
+        (left + side + gap, titles.get("fit", ""), gauges.assumed(sheet)),
     )
     for x, title, line in columns:
         end = canvas.text(x, top - 16, title, 18, INK, 650, most=side)
         canvas.text(max(end + 14, x), top - 16, line, 14.5, DIM, most=side - (end - x) - 14)
-    _photo(sheet, left, top, side)
-    _photo(sheet, left + side + gap, top, side, fit=scene.photo.fit_vertices is not None)
+    photograph(sheet, left, top, side)
+    photograph(sheet, left + side + gap, top, side, fit=scene.photo.fit_vertices is not None)
     below = top + tall
-    _key(sheet, left, below + 34, side)
-    canvas.paragraph(left, below + 62, scene.note, 12.5, DIM, most=side, step=18)
-    warning = _warning(sheet)
-    if warning:
-        canvas.text(left, below + 102, *warning, most=side)
-    _cards(sheet, left + side + gap, below + 16, side)
+    gauges.key(sheet, left, below + 34, side)
+    y = canvas.paragraph(left, below + 62, scene.note, 12.5, DIM, most=side, step=18)
+    gauges.warn(sheet, left, max(y, below + 80) - 4, side)
+    gauges.cards(sheet, left + side + gap, below + 16, side)
 
 
-# ---- heads and photographs ----
-
-
-def _head(
-    sheet: Sheet,
-    head: Head,
-    view: View,
-    middle: tuple[float, float],
-    room: tuple[float, float],
-    ppm: float,
-) -> None:
-    """A head with the scene's pivot at `middle`; ppm: units for a metre. It may stand out of its room a little."""
-    unit = sheet.canvas.unit
-    size = (round(1.16 * room[0] * unit), round(1.04 * room[1] * unit))
-    key = (head.name, view)
-    if key not in sheet.pictures:
-        pivot = gl.viewer_rotation(view) @ sheet.scene.pivot
-        sheet.pictures[key] = gl.render_head(
-            head, view, *size, ppm * unit, middle=(pivot[0], pivot[1]), marked=sheet.scene.landmarks
-        )
-    left, top = middle[0] - size[0] / (2 * unit), middle[1] - size[1] / (2 * unit)
-    sheet.canvas.paste(left, top, sheet.pictures[key])
-
-
-def _assumed(sheet: Sheet, index: int) -> str:
-    """The line under a title where the scene gives none: the distance this face belongs to."""
-    if index == 0 and len(sheet.scene.heads) > 1:
-        return sheet.scene.photo.caption
-    distance = sheet.scene.numbers.distance
-    if distance is None:
-        return sheet.words["far"]
-    return sheet.words["assumed"].format(cm=f"{plots.centimetres(distance)}{THIN}cm")
-
-
-def _photo(sheet: Sheet, x: float, y: float, width: float, *, fit: bool = False) -> None:
-    """The photograph, or the fitted face through its own camera, with both kinds of points over it."""
-    photo = sheet.scene.photo
-    if fit not in sheet.pictures:
-        pixels = round(width * sheet.canvas.unit)
-        size = (pixels, max(1, round(photo.height * pixels / photo.width)))
-        vertices, focal, colours = photo.vertices, photo.focal, photo.colours
-        if fit and photo.fit_vertices is not None:
-            vertices, focal = photo.fit_vertices, photo.fit_focal or photo.focal
-            shown = sheet.scene.heads[-1] if sheet.scene.heads else None
-            if shown is not None and shown.lit and shown.colours.shape == colours.shape:
-                colours = shown.colours
-        sheet.pictures[fit] = painter.paint(vertices, photo, focal, size, colours=colours)
-    picture = sheet.pictures[fit]
-    at = sheet.canvas.paste(x, y, picture, radius=8)
-    step = picture.shape[1] / photo.width
-    marks(sheet.canvas, np.array(at), step, photo, (2.3 + 0.0055 * width) * sheet.canvas.unit)
-
-
-def marks(canvas: Canvas, at: Array, step: float, photo: Photo, radius: float) -> None:
-    """Red crosses (observed) under blue circles (projected), all on one white halo.
-
-    at (2,): pixels, the picture's upper left; step: pixels of the picture for one of the photo; radius in pixels.
-    """
-    points = [p[np.isfinite(p).all(axis=1)] * step + at for p in (photo.observed, photo.projected)]
-    everything = np.concatenate(points)
-    if not len(everything):
+def _bare(sheet: Sheet) -> None:
+    """Heads alone, or both photographs, as large as the picture allows."""
+    scene = sheet.scene
+    width, height = sheet.canvas.room
+    if scene.through_camera:
+        share = scene.photo.height / scene.photo.width
+        side = min((width - MARGIN) / 2, height / share)
+        y, left = (height - side * share) / 2, (width - 2 * side - MARGIN) / 2
+        photograph(sheet, left, y, side)
+        photograph(sheet, left + side + MARGIN, y, side, fit=scene.photo.fit_vertices is not None)
         return
-    stroke, halo = max(1.0, 0.3 * radius), max(1.0, 0.24 * radius)
-    arm = 0.68 * radius
-
-    def crosses(width: float) -> Callable[[Picture, Place], None]:
-        def paint(mask: Picture, place: Place) -> None:
-            for point in points[0]:
-                for turn in ((arm, arm), (arm, -arm)):
-                    ends = place(np.array([point - turn, point + turn]))
-                    cv2.polylines(mask, [ends], False, 255, max(1, round(FINE * width)), shift=4)
-
-        return paint
-
-    def circles(width: float) -> Callable[[Picture, Place], None]:
-        def paint(mask: Picture, place: Place) -> None:
-            for centre in place(points[1]):
-                size = round(16 * FINE * radius)
-                cv2.circle(mask, centre, size, 255, max(1, round(FINE * width)), shift=4)
-
-        return paint
-
-    pad = radius + stroke + halo
-    for colour, paint in (
-        (HALO, crosses(stroke + 2 * halo)),
-        (HALO, circles(stroke + 2 * halo)),
-        (OBSERVED, crosses(stroke)),
-        (PROJECTED, circles(stroke)),
-    ):
-        canvas.ink(colour, everything, pad, paint)
-
-
-def _key(sheet: Sheet, x: float, y: float, width: float) -> None:
-    """Which mark is which, in one line."""
-    canvas = sheet.canvas
-    for a, b in ((-9, -1), (-1, -9)):
-        canvas.line((x + 1, y + a), (x + 9, y + b), OBSERVED, 1.8)
-    end = canvas.text(x + 15, y, sheet.words["cross"], 12.5, DIM, most=0.42 * width)
-    canvas.circle((end + 19, y - 5), 4.6, PROJECTED, 1.7)
-    canvas.text(end + 29, y, sheet.words["circle"], 12.5, DIM, most=x + width - end - 29)
-
-
-# ---- numbers, scale and legend ----
-
-
-def _cards(sheet: Sheet, x: float, y: float, width: float) -> None:
-    """The two numbers whose disagreement is the lesson."""
-    numbers, curves = sheet.scene.numbers, sheet.scene.curves
-    note = sheet.words["d_l_note_alone"]
-    if curves is not None:
-        note = sheet.words["d_l_note"].format(tolerance=f"{curves.tolerance_percent:g}")
-    half = (width - 12) / 2
-    d_l, d_s = percent(numbers.d_l_percent), f"{numbers.d_s_mm:.1f}"
-    _card(sheet, "d_l", (d_l, "%"), note, x, y, half)
-    _card(sheet, "d_s", (d_s, "mm"), sheet.words["d_s_note"], x + half + 12, y, half)
-
-
-def _card(
-    sheet: Sheet, which: str, value: tuple[str, str], note: str, x: float, y: float, width: float
-) -> None:
-    canvas, colour = sheet.canvas, TONES[which]
-    canvas.fill(x, y, 20, CARD_HEIGHT, colour, radius=8)
-    canvas.fill(x + 4, y, width - 4, CARD_HEIGHT, CARD, radius=8)
-    canvas.text(x + 15, y + 25, sheet.words[which], 14, INK, 600, most=width - 22)
-    end = canvas.text(x + 15, y + 58, value[0], 29, colour, 700)
-    canvas.text(end + 4, y + 58, value[1], 16, colour, 600)
-    canvas.paragraph(x + 15, y + 80, note, 12, DIM, most=width - 23, step=17)
-
-
-def _warning(sheet: Sheet) -> tuple[str, float, Colour, int] | None:
-    """Words, size, colour, weight: why not to take the numbers at face value, or what bends the face."""
-    numbers = sheet.scene.numbers
-    if not numbers.converged:
-        return sheet.words["not_converged"], 13.0, OBSERVED, 600
-    if not numbers.plausible:
-        return sheet.words["implausible"], 13.0, OBSERVED, 600
-    if numbers.flex_words:
-        return f"{numbers.flex_words}: {numbers.flex_mm:+.1f}{THIN}mm", 13.0, DIM, 400
-    return None
-
-
-def percent(value: float) -> str:
-    """d_L: 2 decimals below 1 %, 1 above."""
-    return f"{value:.2f}" if value < 0.995 else f"{value:.1f}"
-
-
-def _bar(sheet: Sheet, x: float, y: float, ppm: float, key: str, *, beside: bool = False) -> float:
-    """The scale bar, its words below or beside it; returns where it ends."""
-    canvas, end = sheet.canvas, x + sheet.scene.scale_bar * ppm
-    canvas.line((x, y), (end, y), INK, 1.6)
-    for side in (x, end):
-        canvas.line((side, y - 5), (side, y + 5), INK, 1.6)
-    text = sheet.words[key].format(mm=f"{1e3 * sheet.scene.scale_bar:g}")
-    if beside:
-        return canvas.text(end + 10, y + 5, text, 14, INK)
-    canvas.text((x + end) / 2, y + 24, text, 14, INK, anchor="middle")
-    return end
-
-
-def _legend_beside(canvas: Canvas, legend: Legend, x: float, y: float, height: float) -> None:
-    """The colour scale upright, low at the bottom, title above and note below."""
-    start = canvas.paragraph(x - 24, y, legend.title, 13, DIM, most=104, step=17) + 14
-    height = y + height - start - 14
-    canvas.ramp(x, start, 22, height, legend.colours, upright=True)
-    for tick in legend.ticks:
-        at = start + height * (legend.high - tick) / (legend.high - legend.low)
-        canvas.line((x + 22, at), (x + 27, at), INK)
-        canvas.text(x + 33, at + 5, f"{tick:g}", 14, INK)
-    canvas.text(x - 24, start + height + 26, legend.note, 12.5, DIM, most=150)
-
-
-def _legend_across(canvas: Canvas, legend: Legend, right: float, y: float) -> None:
-    """The colour scale lying, ending at `right`, title above and note below."""
-    width = 250
-    x = right - width
-    canvas.text(x, y - 16, legend.title, 13, DIM)
-    canvas.ramp(x, y - 7, width, 14, legend.colours, upright=False)
-    for tick in legend.ticks:
-        at = x + width * (tick - legend.low) / (legend.high - legend.low)
-        canvas.line((at, y + 7), (at, y + 11), INK)
-        canvas.text(at, y + 25, f"{tick:g}", 13, INK, anchor="middle")
-    canvas.text(x, y + 46, legend.note, 12.5, DIM)
+    rows = places(sheet)
+    cell, tall = width / len(rows), height / len(scene.views)
+    ppm = _scale(scene, cell, tall)
+    for index, heads in enumerate(rows):
+        for row, view in enumerate(scene.views):
+            middle = ((index + 0.5) * cell, (row + 0.5) * tall)
+            standing(sheet, heads, view, middle, (cell, tall), ppm)

@@ -1,8 +1,8 @@
-"""The two curves of a Scene on a canvas: d_L above d_S, one distance axis, one cursor, no double axis."""
+"""The curves of a Scene on a canvas: d_L above d_S above the density, one distance axis, one cursor, no double axis."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -18,8 +18,10 @@ INK, DIM, LINE, BAND = (
     (0xE3, 0xEA, 0xF2),
 )
 D_L, D_S = (0x1B, 0x5F, 0xC1), (0xA8, 0x4A, 0x00)
+DENSITY, AREA = (0x4A, 0x55, 0x63), (0xC9, 0xD3, 0xDE)
 AXIS_CM, TICKS_CM = (20.0, 300.0), (20, 30, 60, 120, 240)
-HEIGHT = 352.0  # units, from the first title to the words under the axis
+# Units: the lower edge of each plot below the upper edge of all, and what follows the last: ticks, words of the axis
+D_L_END, D_S_END, DENSITY_ROOM, AXIS_ROOM = 118.0, 296.0, 92.0, 56.0
 
 
 class Axes(NamedTuple):
@@ -41,6 +43,12 @@ class Axes(NamedTuple):
         return self.bottom - share * (self.bottom - self.top)
 
 
+def height(curves: Curves, hide: Collection[str] = ()) -> float:
+    """Units from the first title to the words under the axis."""
+    last = D_L_END if "truth" in hide else D_S_END
+    return last + (0.0 if curves.density is None else DENSITY_ROOM) + AXIS_ROOM
+
+
 def curves(
     canvas: Canvas,
     curves: Curves,
@@ -49,42 +57,120 @@ def curves(
     x: float,
     y: float,
     width: float,
+    *,
+    hide: Collection[str] = (),
 ) -> None:
-    """Both plots with their upper left at (x, y), HEIGHT high; the far-away camera has its own place at the right."""
+    """The plots with their upper left at (x, y), `height` high; the far-away camera has its own place at the right.
+
+    With "truth" in `hide` there is no d_S. A density is a third plot below.
+    """
     left, far = x + 26, x + width - 12
     right = far - 22
     d_l = max(curves.d_l_percent.max(), curves.orthographic[0], numbers.d_l_percent)
     d_s = max(curves.d_s_mm.max(), curves.orthographic[1], numbers.d_s_mm)
-    upper = Axes(left, right, y + 20, y + 118, 3.0 * max(2.0, np.ceil(d_l / 3.0)))
-    lower = Axes(left, right, y + 164, y + 296, 4.0 * max(3.0, np.ceil(d_s / 4.0)))
+    upper = Axes(left, right, y + 20, y + D_L_END, 3.0 * max(2.0, np.ceil(d_l / 3.0)))
+    lower = Axes(left, right, y + 164, y + D_S_END, 4.0 * max(3.0, np.ceil(d_s / 4.0)))
+    shown = [Line(upper, curves.d_l_percent, curves.orthographic[0], numbers.d_l_percent, D_L)]
     canvas.text(x, y + 6, words["d_l_axis"], 13, D_L, 650)
-    band_words = words["band"].format(tolerance=f"{curves.tolerance_percent:g}")
-    start = canvas.text(x + width, y + 6, band_words, 11, DIM, anchor="end")
-    canvas.fill(start - 18, y - 4, 13, 11, BAND)
-    canvas.text(x, y + 150, words["d_s_axis"], 13, D_S, 650)
-    band = float(upper.y(curves.tolerance_percent))
-    canvas.fill(left, band, far + 8 - left, upper.bottom - band, BAND)
+    _band(canvas, curves, words, upper, far + 8, (x + width, y))
     _grid(canvas, upper, 3 if upper.high <= 12 else 6, far + 8)
-    _grid(canvas, lower, 4 if lower.high <= 16 else 8, far + 8)
-    _ticks(canvas, words, lower, far)
-    _standing(canvas, curves, numbers, words, (upper, lower), (x, far + 12))
-    inside = curves.distances[
-        (curves.distances >= 0.01 * AXIS_CM[0]) & (curves.distances <= 0.01 * AXIS_CM[1])
-    ]
-    for axes, value, colour, dash in (
-        (upper, curves.d_l_percent, D_L, (6.0, 3.0)),
-        (lower, curves.d_s_mm, D_S, None),
-    ):
-        shown = np.interp(inside, curves.distances, value)
-        canvas.curve(axes.x(inside), axes.y(shown), colour, 2.2, dash=dash)
-    canvas.circle((far, float(upper.y(curves.orthographic[0]))), 3.6, D_L, 1.5)
-    canvas.square((far, float(lower.y(curves.orthographic[1]))), 3.4, D_S, 1.5)
-    if numbers.distance is None or 0.2 <= numbers.distance <= 3.0:
+    if "truth" not in hide:
+        canvas.text(x, y + 150, words["d_s_axis"], 13, D_S, 650)
+        _grid(canvas, lower, 4 if lower.high <= 16 else 8, far + 8)
+        shown.append(Line(lower, curves.d_s_mm, curves.orthographic[1], numbers.d_s_mm, D_S))
+    plots = [line.axes for line in shown]
+    if curves.density is not None:
+        bottom = plots[-1].bottom + DENSITY_ROOM
+        plots.append(Axes(left, right, bottom - 58, bottom - 8, 1.0))
+        _density(canvas, curves, words, plots[-1], (x, x + width))
+    _ticks(canvas, words, plots[-1], far)
+    _standing(canvas, curves, numbers, words, plots, (x, far + 12))
+    for line in shown:
+        _curve(canvas, curves, line, far)
+    if numbers.distance is None or AXIS_CM[0] <= 100 * numbers.distance <= AXIS_CM[1]:
         at = far if numbers.distance is None else float(lower.x(numbers.distance))
-        for axes in (upper, lower):
+        for axes in plots:
             canvas.line((at, axes.top - 2), (at, axes.bottom), INK, 1.5)
-        canvas.circle((at, float(upper.y(numbers.d_l_percent))), 4.6, D_L)
-        canvas.square((at, float(lower.y(numbers.d_s_mm))), 4.3, D_S)
+        for line in shown:
+            _marker(canvas, line, at, line.now)
+
+
+class Line(NamedTuple):
+    """One curve in its plot."""
+
+    axes: Axes
+    values: Array  # (D,)
+    far: float  # of the far-away camera
+    now: float  # at the cursor
+    colour: Colour
+
+
+def _curve(canvas: Canvas, curves: Curves, line: Line, far: float) -> None:
+    inside = _inside(curves)
+    values = np.interp(inside, curves.distances, line.values)
+    dash = (6.0, 3.0) if line.colour == D_L else None
+    canvas.curve(line.axes.x(inside), line.axes.y(values), line.colour, 2.2, dash=dash)
+    _marker(canvas, line, far, line.far, ring=True)
+
+
+def _marker(canvas: Canvas, line: Line, x: float, value: float, *, ring: bool = False) -> None:
+    """Round on d_L, square on d_S: told apart without colour too."""
+    at = (x, float(line.axes.y(value)))
+    size, width = (-1.0, 1.5) if ring else (0.0, 0.0)
+    if line.colour == D_L:
+        canvas.circle(at, 4.6 + size, D_L, width)
+    else:
+        canvas.square(at, 4.3 + 0.9 * size, D_S, width)
+
+
+def _inside(curves: Curves) -> Array:
+    low, high = 0.01 * AXIS_CM[0], 0.01 * AXIS_CM[1]
+    return curves.distances[(curves.distances >= low) & (curves.distances <= high)]
+
+
+def _band(
+    canvas: Canvas,
+    curves: Curves,
+    words: Mapping[str, str],
+    axes: Axes,
+    end: float,
+    corner: tuple[float, float],
+) -> None:
+    """What a person cannot tell, and its words up to the upper right `corner`."""
+    text = words["band"].format(tolerance=f"{curves.tolerance_percent:g}")
+    start = canvas.text(corner[0], corner[1] + 6, text, 11, DIM, anchor="end")
+    canvas.fill(start - 18, corner[1] - 4, 13, 11, BAND)
+    top = float(axes.y(curves.tolerance_percent))
+    canvas.fill(axes.left, top, end - axes.left, axes.bottom - top, BAND)
+
+
+def _density(
+    canvas: Canvas,
+    curves: Curves,
+    words: Mapping[str, str],
+    axes: Axes,
+    sides: tuple[float, float],
+) -> None:
+    """How likely each distance is: an area, and below it bars that hold 50 and 95 %."""
+    assert curves.density is not None
+    canvas.text(sides[0], axes.top - 10, words["density"], 13, INK, 650)
+    if curves.beyond >= 0.005:
+        text = words["beyond"].format(percent=f"{100 * curves.beyond:.0f}")
+        canvas.text(sides[1], axes.top - 10, text, 11, DIM, anchor="end")
+    x = axes.x(_inside(curves))
+    y = axes.y(np.interp(_inside(curves), curves.distances, curves.density))
+    canvas.area(
+        np.concatenate([[x[0]], x, [x[-1]]]),
+        np.append(np.append(axes.bottom, y), axes.bottom),
+        AREA,
+    )
+    canvas.curve(x, y, DENSITY, 1.6)
+    canvas.line((axes.left, axes.bottom), (axes.right, axes.bottom), LINE)
+    nearest, farthest = (0.01 * cm for cm in AXIS_CM)
+    for (low, high), width in zip(curves.intervals, (4.5, 1.6), strict=False):
+        at = axes.x(np.clip([low, high], nearest, farthest))
+        if at[1] > at[0]:
+            canvas.line((at[0], axes.bottom + 3.5), (at[1], axes.bottom + 3.5), DENSITY, width)
 
 
 def _grid(canvas: Canvas, axes: Axes, step: int, end: float) -> None:
@@ -108,11 +194,11 @@ def _standing(
     curves: Curves,
     numbers: Numbers,
     words: Mapping[str, str],
-    plots: tuple[Axes, Axes],
+    plots: Sequence[Axes],
     ends: tuple[float, float],
 ) -> None:
     """The dotted line at the truth, and below the ticks what is true and what is assumed, never over each other."""
-    axes = plots[1]
+    axes = plots[-1]
     labels: list[tuple[float, str, Colour]] = []
     for distance, key, colour in (
         (curves.true_distance, "true", DIM),

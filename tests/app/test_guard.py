@@ -610,6 +610,29 @@ def test_the_log_is_one_line_whatever_is_in_it(caplog: pytest.LogCaptureFixture)
 # ---------------------------------------------------------------- data for the script
 
 
+def test_reports_are_heard_each_in_order(tiny: Tiny, caplog: pytest.LogCaptureFixture) -> None:
+    with tiny.browser() as (browser, made):
+        heard: list[str] = []
+        api = made["slider"]._impl.gui_api
+        control = guard.add_reports(api, heard.append)
+        for text in ("a", "a", "b", "x" * (guard.MAX_REPORT + 1), 7, "c"):
+            browser.update(control, value=text)
+        browser.update(control, disabled=True)
+        browser.update(control, value="d")
+        assert until(lambda: len(heard) == 5)
+        assert heard == ["a", "a", "b", "c", "d"]
+        assert control.value == ""
+        assert len([r for r in caplog.records if "report" in r.getMessage()]) == 1
+
+        def failing(_: str) -> None:
+            raise RuntimeError("no ear")
+
+        tiny.errors.clear()
+        browser.update(guard.add_reports(api, failing), value="e")
+        assert until(lambda: tiny.errors)
+        assert tiny.errors[0][1] == "no ear"
+
+
 def test_data_are_escaped() -> None:
     text = guard.data_html("title", '"><script>x</script>')
     assert "<script>" not in text

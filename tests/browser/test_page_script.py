@@ -1,4 +1,4 @@
-"""What assets/page.js and the mended bundle do, in Chromium, on a server of two sliders and a mesh."""
+"""What assets/page/*.js and the mended bundle do, in Chromium, on a server of two sliders and a mesh."""
 
 from __future__ import annotations
 

@@ -7,16 +7,17 @@ from __future__ import annotations
 
 from types import ModuleType
 
-from . import fit, landmarks, models, modes, posterior, serve, snapshot, sweep
+from . import animate, fit, landmarks, models, modes, posterior, serve, snapshot, sweep
 
 # The order of the help
 COMMANDS: tuple[tuple[str, ModuleType, str], ...] = (
     ("serve", serve, "open the page on this machine"),
     ("snapshot", snapshot, "draw the page's picture of a state, without a browser"),
+    ("animate", animate, "draw a sweep of distances or a swing of a mode, or a page that plays it"),
     ("fit", fit, "fit a face to the points of a photograph"),
     ("sweep", sweep, "fit at many distances"),
     ("modes", modes, "other faces behind the same points: flexibility, posterior modes, extremes"),
     ("posterior", posterior, "how probable each distance is, and how open the face"),
     ("landmarks", landmarks, "find the points of a face in a photograph"),
-    ("models", models, "what a model holds: modes, landmark schemes"),
+    ("models", models, "what a model holds; convert one, install a free one"),
 )

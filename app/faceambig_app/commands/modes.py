@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
 
+from . import kinds
 from .inputs import add_camera, add_fitting, add_input, fit_of, start_of
 from .progress import Progress
 from .shared import (
@@ -26,18 +27,8 @@ if TYPE_CHECKING:
 
     import faceambig as fa
     from faceambig.arrays import Array
-    from faceambig.flex import Linearisation
 
-    from ..sheets import Bent
 
-BENT_MM = 10.0  # of the table; no face is drawn farther unless asked for
-BENT_SD = 2.0  # of drawn posterior modes
-DRAWN = 3  # modes in the picture
-AT: dict[str, Linearisation] = {
-    "reprojection": "reprojection",
-    "dlt": "algebraic",
-}  # names of the library
-STARTS = 24  # of the search for extreme faces, the library's default
 KINDS = ("obj", "ply", "glb")
 
 
@@ -59,7 +50,7 @@ def add(command: argparse.ArgumentParser) -> None:
     command.add_argument("--count", type=int, help="modes listed (default 3)")
     command.add_argument(
         "--at",
-        choices=tuple(AT),
+        choices=tuple(kinds.AT),
         help="where the landmarks' change is taken (default reprojection)",
     )
     command.add_argument(
@@ -99,18 +90,6 @@ def add(command: argparse.ArgumentParser) -> None:
     add_outputs(command, "the modes", "the first of these faces beside the fit")
 
 
-class Result:
-    """What one of the three kinds has to say. Filled in by it, written and printed by `run`."""
-
-    def __init__(self) -> None:
-        self.record: dict[str, Any] = {}
-        self.lines: list[str] = []
-        self.header: tuple[str, ...] = ()
-        self.rows: list[tuple[Any, ...]] = []
-        self.drawn: list[Bent] = []
-        self.faces: list[tuple[str, Array, str]] = []  # name of the file, alpha, words
-
-
 def run(options: argparse.Namespace) -> int:
     """List modes or extreme faces of a fit; write table, picture and meshes if asked."""
     csv, plot = outputs_of(options)
@@ -118,7 +97,13 @@ def run(options: argparse.Namespace) -> int:
     _refuse_unused(options)
     start = start_of(options)
     fit = fit_of(options, start)
-    kind = _extremes if options.extremes else _posterior if options.posterior else _flexible
+    kind = (
+        kinds.extremes
+        if options.extremes
+        else kinds.posterior
+        if options.posterior
+        else kinds.flexible
+    )
     result = kind(options, fit)
     note = f"{fit.model.name} model; {start.notes['landmarks']}"
     files: dict[Path, bytes] = {}
@@ -160,301 +145,6 @@ def _refuse_unused(options: argparse.Namespace) -> None:
             raise ValueError(
                 f"{flag}: only without --{kind}" if kind else f"{flag}: only with --extremes"
             )
-
-
-# ---- flexibility ----
-
-
-def _flexible(options: argparse.Namespace, fit: fa.Fit) -> Result:
-    import numpy as np
-
-    import faceambig as fa
-    from faceambig.flex import count_of, plausible_limit
-
-    count = count_of(fit, 3 if options.count is None else options.count)
-    modes = fa.flexibility_modes(
-        fit.model, fit, None, linearisation=AT[options.at or "reprojection"], pose=options.pose or "fixed",
-        free_distance=options.free_distance,
-    )  # fmt: skip
-    kept = modes.truncated(2.0 if options.k1 is None else options.k1, **_k2(options.k2))
-    limit = plausible_limit(len(fit.alpha))
-    result = Result()
-    result.header = (
-        "mode", "landmark_percent_at_10_mm", "reach_low_mm", "reach_high_mm", "alpha_at_minus_10_mm", "alpha_at_10_mm",
-        "kept", "kept_plausible", "words",
-    )  # fmt: skip
-    records: list[dict[str, Any]] = []
-    for k in range(count):
-        row = _mode_record(modes, kept, limit, k)
-        records.append(row)
-        result.rows.append(
-            (k + 1, max(row["landmark_percent_at_10_mm"]), *row["reach_mm"], *row["alpha_size_at_10_mm"],
-             int(row["kept"]), int(row["kept_plausible"]), row["words"])
-        )  # fmt: skip
-    result.record = {"modes": records, "alpha_size_limit": limit, "truncation": _truncation(kept)}
-    result.lines = [*_flexible_lines(records, modes), *_kept_lines(kept, limit, len(fit.alpha))]
-    for k, mm in _reached(modes, count, options.mm):
-        alpha = fit.alpha + mm * modes.directions[k]
-        result.faces.append(
-            (
-                _name("mode", k, mm),
-                alpha,
-                f"flexibility mode {k + 1}, {mm:+.3g} mm: {modes.words[k]}",
-            )
-        )
-        if k < DRAWN:
-            from ..sheets import mode_face
-
-            d_l = _landmark_error(fit, alpha, modes.camera(k, mm))
-            plausible = float(np.linalg.norm(alpha)) <= limit * (
-                1 + 1e-9
-            )  # at the end of the reach itself, too
-            result.drawn.append(mode_face(k + 1, mm, alpha, d_l, plausible))
-    return result
-
-
-def _reached(
-    modes: fa.FlexibilityModes, count: int, mm: float | None
-) -> Iterator[tuple[int, float]]:
-    """(mode, millimetres) to both sides: as asked, or as far as the face is plausible, 10 mm at most."""
-    if mm is not None and not 0 < mm < float("inf"):
-        raise ValueError(f"--mm: {mm:g} is not above 0")
-    for k in range(count):
-        low, high = (-BENT_MM, BENT_MM) if mm is None else (-mm, mm)
-        if mm is None and modes.reach(k) != (0.0, 0.0):
-            low, high = max(low, modes.reach(k)[0]), min(high, modes.reach(k)[1])
-        yield k, low
-        yield k, high
-
-
-def _k2(text: str | None) -> dict[str, float]:
-    """Keyword of `truncated`: pixels, or percent of the interocular distance where the text ends so."""
-    if text is None:
-        return {}
-    name = "landmark_percent" if text.endswith("%") else "landmark_px"
-    try:
-        return {name: float(text.removesuffix("%"))}
-    except ValueError as error:
-        raise ValueError(
-            f"--k2: {text!r:.40} is not a number of pixels, or of percent as in 1%"
-        ) from error
-
-
-def _mode_record(
-    modes: fa.FlexibilityModes, kept: fa.KeptModes, limit: float, k: int
-) -> dict[str, Any]:
-    import numpy as np
-
-    fit, f = modes.fit, modes.directions[k]
-    ends = (-BENT_MM, BENT_MM)
-    sizes = [float(np.linalg.norm(fit.alpha + mm * f)) for mm in ends]
-    at_k1 = [float(np.linalg.norm(fit.alpha + sign * kept.surface_mm * f)) for sign in (-1, 1)]
-    is_kept = k in kept.kept
-    return {
-        "number": k + 1,
-        "words": modes.words[k],
-        "landmark_percent_per_mm": float(modes.landmark_percent[k]),  # first order
-        "landmark_percent_at_10_mm": [_moved(modes, k, mm) for mm in ends],
-        "reach_mm": list(modes.reach(k)),
-        "alpha_size_at_10_mm": sizes,
-        "kept": bool(is_kept),
-        "kept_plausible": bool(is_kept and max(at_k1) <= limit),
-        "direction": f.tolist(),
-    }
-
-
-def _moved(modes: fa.FlexibilityModes, k: int, mm: float) -> float:
-    """Mean landmark movement in the picture by `mm` along a mode, projected, not linearised; % of the eye distance."""
-    import numpy as np
-
-    fit = modes.fit
-    seen = fit.observation.visible
-    bent = _projected(fit, fit.alpha + mm * modes.directions[k], modes.camera(k, mm))[seen]
-    way = np.linalg.norm(bent - fit.projected()[seen], axis=1).mean()
-    return 100 * float(way) / fit.interocular_px
-
-
-def _landmark_error(fit: fa.Fit, alpha: Array, camera: Any) -> float:
-    """d_L of a face in the fit's photograph."""
-    from faceambig.metrics import mean_gap_percent
-
-    seen = fit.observation.visible
-    gaps = (fit.observation.points - _projected(fit, alpha, camera))[seen]
-    return mean_gap_percent(gaps, fit.interocular_px)
-
-
-def _projected(fit: fa.Fit, alpha: Array, camera: Any) -> Array:
-    """(L, 2) pixels: the landmarks of a face, seen by a camera."""
-    from dataclasses import replace
-
-    return replace(fit, alpha=alpha, camera=camera).projected()
-
-
-def _truncation(kept: fa.KeptModes) -> dict[str, Any]:
-    return {
-        "k1_mm": kept.surface_mm,
-        "k2_px": kept.landmark_px,
-        "kept": [int(k) + 1 for k in kept.kept],
-        "plausible": kept.plausible,
-        "plausible_upper": kept.plausible_upper,
-        "plausible_faces": kept.plausible_faces,
-    }
-
-
-def _flexible_lines(records: Sequence[dict[str, Any]], modes: fa.FlexibilityModes) -> Iterator[str]:
-    yield f"flexibility modes, landmarks by {modes.linearisation}, pose {modes.pose}"
-    yield "mode   landmarks % at 10 mm   plausible from to mm   |alpha| at -10 +10 mm   kept            moves"
-    for row in records:
-        landmarks = max(row["landmark_percent_at_10_mm"])
-        low, high = row["reach_mm"]
-        minus, plus = row["alpha_size_at_10_mm"]
-        kept = "kept, plausible" if row["kept_plausible"] else "kept" if row["kept"] else "-"
-        yield (
-            f"{row['number']:4} {landmarks:22.2f} {low:12.1f} {high:9.1f} {minus:14.1f} {plus:8.1f}   "
-            f"{kept:<15} {row['words']}"
-        )
-
-
-def _kept_lines(kept: fa.KeptModes, limit: float, S: int) -> list[str]:
-    return [
-        f"a face is plausible up to |alpha| {limit:.1f}, 3 sd above the mean of {S} coefficients",
-        (
-            f"{len(kept)} of {S} modes are kept: {kept.surface_mm:g} mm of the surface move the landmarks by less than "
-            f"{kept.landmark_px:.3g} px; {kept.plausible_faces} of them give plausible faces both ways"
-        ),
-    ]
-
-
-# ---- posterior ----
-
-
-def _posterior(options: argparse.Namespace, fit: fa.Fit) -> Result:
-    import faceambig as fa
-
-    modes = fa.posterior_modes(
-        fit.model, fit, 3 if options.count is None else options.count, pose=options.pose or "free",
-        free_distance=options.free_distance,
-    )  # fmt: skip
-    spread = fa.surface_spread(fit.model, fit)
-    result = Result()
-    result.header = ("mode", "sd_mm", "landmark_percent", "words")
-    rows = zip(
-        modes.amplitude_mm.tolist(), modes.landmark_percent.tolist(), modes.words, strict=True
-    )
-    result.rows = [(k, *row) for k, row in enumerate(rows, start=1)]
-    result.record = {
-        "modes": [
-            {"number": k, "words": words, "sd_mm": sd, "landmark_percent": moved, "direction": f}
-            for (k, sd, moved, words), f in zip(result.rows, modes.directions.tolist(), strict=True)
-        ],
-        "total_mm": modes.total_mm,
-        "pose": modes.pose,
-        "noise_px": modes.noise_px,
-        "spread": {
-            "prior_mm": spread.prior_mm,
-            "shape_mm": spread.shape_mm,
-            "pose_mm": spread.pose_mm,
-            "distance_mm": spread.distance_mm,
-            "total_mm": spread.total_mm,
-        },
-    }
-    result.lines = [
-        (
-            f"posterior modes, pose {modes.pose}{', distance free' if options.free_distance else ''}, landmark noise "
-            f"{modes.noise_px:.2f} px"
-        ),
-        "mode   1 sd mm   landmarks %   moves",
-        *(f"{k:4} {sd:9.2f} {moved:13.2f}   {words}" for k, sd, moved, words in result.rows),
-        f"all modes together: {modes.total_mm:.2f} mm, rms over the measured surface, 1 sd",
-        (
-            f"of it by shape {spread.shape_mm:.2f} mm, added by pose {spread.pose_mm:.2f} mm, added by distance "
-            f"{spread.distance_mm:.2f} mm; with all open {spread.total_mm:.2f} mm, before any picture "
-            f"{spread.prior_mm:.2f} mm"
-        ),
-    ]
-    for k, sd in _signs(len(modes.words), BENT_SD):
-        alpha = fit.alpha + sd * modes.directions[k]
-        result.faces.append(
-            (
-                _name("posterior", k, sd),
-                alpha,
-                f"posterior mode {k + 1}, {sd:+g} sd: {modes.words[k]}",
-            )
-        )
-        if k < DRAWN:
-            from ..sheets import deviation_face
-
-            moved = abs(sd) * float(modes.landmark_percent[k])
-            result.drawn.append(deviation_face(k + 1, sd, alpha, moved))
-    return result
-
-
-# ---- extremes ----
-
-
-def _extremes(options: argparse.Namespace, fit: fa.Fit) -> Result:
-    import faceambig as fa
-
-    from ..sheets import extreme_face
-
-    tolerance = 3.0 if options.tolerance is None else options.tolerance
-    with Progress("starts", STARTS) as progress:
-        found = fa.extreme_faces(
-            fit.model,
-            fit,
-            tolerance,
-            pose=options.pose or "fixed",
-            starts=STARTS,
-            progress=progress,
-        )
-    result = Result()
-    result.header = ("face", "rms_mm", "mean_mm", "d_s_mm", "landmark_rms_percent", "d_l_percent")
-    result.rows = [
-        (k, face.rms_mm, face.mean_mm, face.d_s_mm, face.landmark_rms_percent, face.d_l_percent)
-        for k, face in enumerate(found.faces, start=1)
-    ]
-    result.record = {
-        "faces": [
-            dict(zip(result.header, row, strict=True)) | {"alpha": face.alpha.tolist()}
-            for row, face in zip(result.rows, found.faces, strict=True)
-        ],
-        "tolerance_percent": found.tolerance_percent,
-        "pose": found.pose,
-        "reached_mm": found.faces[0].rms_mm,
-        "bound_mm": found.bound_mm,
-        "ratio": found.ratio,
-    }
-    result.lines = [
-        f"extreme faces, landmarks within {tolerance:g} % rms of the eye distance, pose {found.pose}",
-        "face   rms mm   mean mm   d_S mm   landmarks rms %   d_L %",
-        *(
-            f"{k:4} {rms:8.2f} {mean:9.2f} {d_s:8.2f} {marks:17.2f} {d_l:7.2f}"
-            for k, rms, mean, d_s, marks, d_l in result.rows
-        ),
-        (
-            f"reached {found.faces[0].rms_mm:.2f} mm rms; no face passes {found.bound_mm:.2f} mm while landmarks are "
-            f"linear in the shape, and {100 * found.ratio:.0f} % of that was found there"
-        ),
-    ]
-    for k, face in enumerate(found.faces, start=1):
-        result.faces.append(
-            (f"extreme_{k}", face.alpha, f"extreme face {k}, {face.rms_mm:.2f} mm rms from the fit")
-        )
-        result.drawn.append(extreme_face(k, face))
-    return result
-
-
-# ---- shared ----
-
-
-def _signs(count: int, size: float) -> Iterator[tuple[int, float]]:
-    for k in range(count):
-        yield k, -size
-        yield k, size
-
-
-def _name(kind: str, k: int, amount: float) -> str:
-    return f"{kind}_{k + 1}_{'plus' if amount > 0 else 'minus'}"
 
 
 def _meshes(

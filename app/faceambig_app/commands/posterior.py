@@ -6,6 +6,8 @@ import argparse
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
+from ..forms import value_of
+from ..state import DEFAULT, FIELDS, changed
 from .inputs import Start, add_fitting, add_input, fitting, start_of
 from .progress import Progress
 from .shared import (
@@ -60,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
     import faceambig as fa
 
     csv, plot = outputs_of(options)
-    out = _folder(options)
+    out, _ = _folder(options), _seed(options)
     distances = distances_of(options, least=2)
     start = start_of(options)
     between = options.between
@@ -114,6 +116,13 @@ def _folder(options: argparse.Namespace) -> Path | None:
     from ..photo import folder
 
     return folder(options.out, ())
+
+
+def _seed(options: argparse.Namespace) -> int:
+    """Of the draws, and of the noise of a subject."""
+    if options.seed is None:
+        return DEFAULT.seed
+    return changed(DEFAULT, seed=value_of(FIELDS["seed"], options.seed)).seed
 
 
 def _assumed(options: argparse.Namespace, start: Start) -> dict[str, Any]:
@@ -197,7 +206,7 @@ def _lines(found: fa.Posterior, spread: Mapping[str, Any], prior: str) -> Iterat
     options = found.sweep.orthographic.options
     box = "no box" if options.box is None else f"box {options.box:g} sd"
     yield (
-        f"landmark noise: {found.sigma_px:.2f} px per coordinate, what modes left out cause in it; "
+        f"landmark noise: {found.sigma_px:.2f} px per coordinate, with what modes left out would cause; "
         f"{options.modes} modes, {box}"
     )
     where = "" if spread["max_region"] is None else f", at the {spread['max_region']}"
@@ -232,7 +241,7 @@ def _draws(
 
     from ..photo import face_meshes
 
-    seed = 0 if options.seed is None else int(options.seed)
+    seed = _seed(options)
     drawn = found.sample(options.draws, seed)
     digits = len(str(len(drawn)))
     names = [f"draw_{k:0{digits}}" for k in range(1, len(drawn) + 1)]

@@ -16,6 +16,11 @@ def add(command: argparse.ArgumentParser) -> None:
     )
     command.add_argument("--width", type=int, metavar="PX", help="width of the picture")
     command.add_argument("--height", type=int, metavar="PX", help="height of the picture")
+    add_state(command)
+
+
+def add_state(command: argparse.ArgumentParser) -> None:
+    """The flags of a state: the model, and the rows of the field table."""
     command.add_argument(
         "--state", metavar="FILE.json", help="a state, as saved by the page; flags change it"
     )

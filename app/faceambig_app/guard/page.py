@@ -47,9 +47,9 @@ _OUR_SENDER = (
 # The canvas is told in device pixels, three to a pixel of the page on a phone; the page's own decide the layout.
 _CANVAS = "image_height:o.height,image_width:o.width,fov:"
 _OUR_CANVAS = "image_height:o.clientHeight,image_width:o.clientWidth,fov:"
-# Dark, once forced by the page around viser's, stayed for ever; ours is asked each time.
+# Dark, where the page around viser's asks for it, stays for ever; our script is asked at every change.
 _DARK = "r=n.useGui(e=>e.theme.dark_mode),i=t||r,"
-_OUR_DARK = "r=n.useGui(e=>e.theme.dark_mode),i=(window.__faceambig?.dark()??t)||r,"
+_OUR_DARK = "r=n.useGui(e=>window.__faceambig?.dark(e.theme.dark_mode)??e.theme.dark_mode),i=t||r,"
 PATCHES = ((_SENDER, _OUR_SENDER), (_CANVAS, _OUR_CANVAS), (_DARK, _OUR_DARK))
 _PACKED = re.compile(
     r'<script data-p="([^"]*)" data-ss="(\d+)" data-cs="(\d+)">(.*?)</script>', re.DOTALL

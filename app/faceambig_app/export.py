@@ -1,0 +1,265 @@
+"""A state as a file: picture, mesh, numbers, the state itself, an animation, the standalone page. Nothing is written.
+
+Every file says where it comes from: state, model, licence, version. A photograph of one's own is left out unless it is
+asked for; then the face that was fitted stands in its place.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+import faceambig as fa
+from faceambig.arrays import vertex_normals
+from faceambig.compose import Face, curves
+from faceambig.io.meshes import Mesh, encode_glb, encode_obj, encode_ply
+from faceambig.io.pictures import DIAGONAL_35MM
+from faceambig.scene import Curves, Scene
+
+from . import pipeline
+from .forms import to_json
+from .provenance import file_name, notes, provenance, shown
+from .state import DEFAULT, Fitting, Target, ViewState, changed
+
+SCALES = (1, 2, 4)  # of a picture
+FACES = ("fit", "true")  # of a mesh
+FORMAT_VERSION = 1  # of the JSON of numbers; what is added does not raise it
+MESHES: Mapping[str, Callable[[Mesh], bytes]] = {
+    "ply": encode_ply,
+    "obj": encode_obj,
+    "glb": encode_glb,
+}
+KINDS = ("png", *MESHES, "csv", "json", "state", "html", "webp", "gif")
+
+
+def files(state: ViewState, kind: str, **options: Any) -> tuple[str, bytes]:
+    """(name, contents) of a state as a file of one of KINDS.
+
+    Parameters
+    ----------
+    options: of "png": scale (1, 2 or 4), transparent, overlays, own_photo; see `picture`. Of "ply", "obj", "glb":
+        face ("fit" or "true"). Of "html": whats, own_photo; see `player.page`. Of "webp", "gif": those of
+        `animate.animation`. "csv" and "json" are the numbers, "state" the JSON that `ViewState` reads; they have none.
+
+    Raises
+    ------
+    ValueError: no such kind, or an option's value. TypeError: an option the kind does not have.
+    NoRendererError: a picture or an animation where there is no OpenGL.
+    """
+    if kind == "png":
+        return picture(state, **options)
+    if kind in MESHES:
+        return mesh(state, kind, **options)
+    if kind in ("csv", "json"):
+        return numbers(state, kind, **options)
+    if kind == "state":
+        return state_file(state, **options)
+    if kind == "html":
+        from .player import page
+
+        return page(state, **options)
+    if kind in ("webp", "gif"):
+        from .animate import animation
+
+        return animation(state, kind, **options)
+    raise ValueError(f"kind: {kind!r} is not one of {', '.join(KINDS)}")
+
+
+def picture(
+    state: ViewState,
+    *,
+    scale: int = 1,
+    transparent: bool = False,
+    overlays: bool = True,
+    own_photo: bool = False,
+) -> tuple[str, bytes]:
+    """The snapshot as a PNG of `scale` times 1440 x 900, a strip 1600 x 760.
+
+    transparent: nothing behind the heads. overlays: False leaves the heads alone, without words, marks and numbers.
+    """
+    from faceambig.render.overlay import draw, encode_png
+
+    if scale not in SCALES:
+        raise ValueError(f"scale: {scale!r} is not one of {', '.join(map(str, SCALES))}")
+    scene = pipeline.frame(state).scene
+    scene = scene if own_photo else without_own_photo(scene)
+    rgba = draw(scene, scale=scale, transparent=transparent, overlays=overlays)
+    return file_name(shown(state), "png"), encode_png(rgba, provenance(state))
+
+
+def without_own_photo(scene: Scene) -> Scene:
+    """The scene with the fitted face where a photograph of one's own was; a synthetic one stays."""
+    if scene.photo.pixels is None:
+        return scene
+    return replace(scene, photo=replace(scene.photo, pixels=None))
+
+
+def mesh(state: ViewState, kind: str, *, face: str = "fit") -> tuple[str, bytes]:
+    """The fitted face, laid rigidly on the true one, or the true face: metres, in the colours it is shown in."""
+    if face not in FACES:
+        raise ValueError(f"face: {face!r} is not one of {', '.join(FACES)}")
+    if face == "true" and "truth" in state.hide:
+        raise ValueError("face: 'true' is hidden in this state")
+    state = changed(state, show="both")
+    scene = pipeline.frame(state, with_curves=False).scene
+    head = next(head for head in scene.heads if head.name == face)
+    about = (head.title, *notes(state))
+    written = Mesh(
+        head.vertices, head.faces, head.colours, vertex_normals(head.vertices, head.faces), about
+    )
+    return file_name(shown(state), f"{face}.{kind}"), MESHES[kind](written)
+
+
+def state_file(state: ViewState) -> tuple[str, bytes]:
+    """The state as JSON, defaults left out: what `forms.from_json` and `--state` read."""
+    return file_name(shown(state), "state.json"), (to_json(state) + "\n").encode()
+
+
+def numbers(state: ViewState, kind: str) -> tuple[str, bytes]:
+    """The numbers of a state as "json", or as "csv": a line a number, with its place and its unit."""
+    name = file_name(shown(state), f"numbers.{kind}")
+    record = measured(state)
+    if kind == "json":
+        return name, (json.dumps(record, indent=1) + "\n").encode()
+    text = io.StringIO()
+    text.writelines(f"# {note}\n" for note in notes(state))
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(("quantity", "at", "value", "unit"))
+    table.writerows(_rows(record))
+    return name, text.getvalue().encode()
+
+
+def measured(state: ViewState) -> dict[str, Any]:
+    """The numbers of a state by name: metres, pixels, radians, as `faceambig fit --json` has them.
+
+    The curves and the interval are those of the unbent face, as on the page. None: far away, or not applicable.
+    """
+    state = changed(state, show="both")
+    face = pipeline.face(state.target, state.fitting, state.bend)
+    fit, origin = face.fit, provenance(state)
+    return {
+        "format": "faceambig-numbers",
+        "version": FORMAT_VERSION,
+        "software": origin["Software"],
+        "model": origin["Model"],
+        "licence": origin["Licence"],
+        "state": json.loads(to_json(state)),
+        "subject": pipeline.photograph(state.target).subject.name,
+        "actual_m": state.actual,
+        "camera": state.camera,
+        "distance_m": fit.distance,
+        "status": str(fit.status),
+        "plausible": face.plausible,
+        "d_l_percent": face.d_l_percent,
+        "d_l_unit": fit.interocular_meaning,
+        "d_s_mm": face.d_s_mm,
+        "focal_px": fit.focal,
+        "focal_35mm": _focal_35mm(fit),
+        "scale": fit.scale,
+        "rotation": fit.rotation.tolist(),
+        "translation_m": fit.translation.tolist(),
+        "cost": fit.cost,
+        "alpha": _alpha(state, face).tolist(),
+        **_along_distance(state),
+    }
+
+
+def _alpha(state: ViewState, face: Face) -> np.ndarray:
+    """(S,) coefficients of the face shown, its bend included."""
+    if not state.flex:
+        return face.fit.alpha
+    last = max(mode for mode, _ in state.flex)
+    modes = pipeline.bending(state.target, state.fitting, state.flex_at, last)
+    return face.fit.alpha + sum(mm * modes.directions[mode - 1] for mode, mm in state.flex)
+
+
+def _focal_35mm(fit: fa.Fit) -> float | None:
+    """Millimetres of the lens that frames the picture so on 35 mm film, diagonals compared; None if far away."""
+    size = fit.observation.image_size
+    if fit.focal is None or size is None:
+        return None
+    return fit.focal * DIAGONAL_35MM / math.hypot(*size)
+
+
+def _along_distance(state: ViewState) -> dict[str, Any]:
+    """Interval and curves of a target over all distances."""
+    sweep, curve = swept(state.target, state.fitting._replace(distance=None))
+    interval = sweep.interval()
+    fits = (*sweep.fits, sweep.orthographic)
+    return {
+        "interval": {
+            "low_m": interval.low,
+            "high_m": interval.high,
+            "empty": interval.empty,
+            "pieces": interval.pieces,
+            "best_d_l_percent": interval.best_d_l_percent,
+            "tolerance_percent": interval.tolerance_percent,
+        },
+        "curves": {
+            "distance_m": [*sweep.distances.tolist(), None],
+            "d_l_percent": [*curve.d_l_percent.tolist(), curve.orthographic[0]],
+            "d_s_mm": [*curve.d_s_mm.tolist(), curve.orthographic[1]],
+            "focal_px": [fit.focal for fit in fits],
+            "focal_35mm": [_focal_35mm(fit) for fit in fits],
+            "status": [str(fit.status) for fit in fits],
+        },
+    }
+
+
+@lru_cache(maxsize=16)
+def swept(target: Target, fitting: Fitting) -> tuple[fa.Sweep, Curves]:
+    """The sweep behind a target's curves, and the curves; asked as `pipeline.curve` asks, so the numbers are its."""
+    taken = pipeline.photograph(target)
+    sweep = fa.sweep_distance(
+        taken.subject.model,
+        taken.observation,
+        modes=None if fitting.modes == DEFAULT.modes else fitting.modes,
+        box=fitting.box,
+        noise_percent=fitting.prior,
+        tolerance=1e-6,
+    )
+    return sweep, curves(taken.subject, sweep, target.actual)
+
+
+UNITS = {"_m": "m", "_px": "px", "_percent": "%", "_mm": "mm", "_35mm": "mm"}
+AXES = ("x", "y", "z")
+
+
+def _rows(record: Mapping[str, Any]) -> list[tuple[str, object, object, str]]:
+    """(quantity, at, value, unit) of each number: `at` is an axis, a mode from 1, or metres assumed, inf far away."""
+    rows: list[tuple[str, object, object, str]] = []
+    for name, value in record.items():
+        if name in ("format", "version", "software", "model", "licence", "state", "curves"):
+            continue
+        if isinstance(value, Mapping):
+            rows += [(f"{name}_{part}", "", _cell(v), _unit(part)) for part, v in value.items()]
+        elif isinstance(value, list):
+            places = range(1, len(value) + 1) if name == "alpha" else AXES
+            unit = {"alpha": "sd", "rotation": "rad"}.get(name) or _unit(name)
+            rows += [(name, at, v, unit) for at, v in zip(places, value, strict=True)]
+        else:
+            rows.append((name, "", _cell(value), _unit(name)))
+    metres = record["curves"]["distance_m"]
+    for name, values in record["curves"].items():
+        if name != "distance_m":
+            rows += [
+                (f"curve_{name}", _cell(at, "inf"), _cell(v), _unit(name))
+                for at, v in zip(metres, values, strict=True)
+            ]
+    return rows
+
+
+def _cell(value: object, nothing: str = "") -> object:
+    return nothing if value is None else str(value).lower() if isinstance(value, bool) else value
+
+
+def _unit(name: str) -> str:
+    return next((unit for ending, unit in UNITS.items() if name.endswith(ending)), "")
