@@ -339,7 +339,7 @@ class Browser:
     ) -> Contents:
         """As `_contents`, of a person's own photograph."""
         at, scene = self.panel.places, shown.scene
-        cards, marks = own_page.cards(own, scene, state.hide), own_page.marks(own, scene)
+        cards, marks = own_page.cards(own, state, scene), own_page.marks(own, scene)
         html: Contents = [(at.crosses, "")]
         if self.stage.narrow:  # one below the other: a finger needs a large photograph
             html.append((at.marks, marks + cards))
@@ -352,7 +352,7 @@ class Browser:
             self._picture_of = taken
         if not draft:
             self._curves_of = None
-            words = own_page.spoken(own, scene, state.hide) + figures.heads_words(scene)
+            words = own_page.spoken(own, state, scene) + figures.heads_words(scene)
             html += [
                 (at.plots, own_page.curves(own, state, scene)),
                 (at.legend, "" if scene.legend is None else figures.legend(scene.legend)),

@@ -195,8 +195,8 @@ def replace_part(own: OwnPhoto, part: tuple[float, float, float, float] | None) 
 # ---------------------------------------------------------------- from points to a frame
 
 
-def problem(own: OwnPhoto | None) -> str:
-    """Why no face can be fitted, in words; "" if one can."""
+def problem(own: OwnPhoto | None, state: ViewState | None = None) -> str:
+    """Why no face can be fitted, in words; "" if one can. Without a state only the points are looked at."""
     if own is None:
         return say("own.none")
     points = own.points[np.isfinite(own.points).all(axis=1)]
@@ -204,7 +204,23 @@ def problem(own: OwnPhoto | None) -> str:
     if len(places) < MIN_POINTS:
         return say("own.few", points=len(places), needed=MIN_POINTS)
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    return say("own.line") if spread[1] <= FLATTEST * spread[0] else ""
+    if spread[1] <= FLATTEST * spread[0]:
+        return say("own.line")
+    return (
+        ""
+        if state is None
+        else _once(own, ("failed", state.model, state.fitting), lambda: _failed(own, state))
+    )
+
+
+def _failed(own: OwnPhoto, state: ViewState) -> str:
+    """Why the solver refuses these points, such as those of a face from behind; "" if it does not."""
+    try:
+        for fitting in (state.fitting, state.fitting._replace(distance=REFERENCE)):
+            _fit(own, state, fitting)
+    except ValueError as error:
+        return say("own.no_fit", cause=str(error).removeprefix("points: "))
+    return ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -224,7 +240,7 @@ def own_frame(own: OwnPhoto | None, state: ViewState, draft: bool) -> OwnFrame:
     """
     if state.data != "points":
         raise ValueError(say("own.only_points"))
-    if own is None or problem(own):
+    if own is None or problem(own, state):
         return OwnFrame(_average(own, state))
     fitting = state.fitting
     subject = reference(own, state, draft)
@@ -286,7 +302,7 @@ def told_distance(own: OwnPhoto | None, state: ViewState) -> float | None:
     f = s t_z: a lens of f pixels that shows the face with s pixels a metre stands t_z away (MATH.md 1). None too where
     that is no distance that can be assumed: the picture is then cropped or zoomed.
     """
-    if own is None or own.taken.focal_px is None or problem(own):
+    if own is None or own.taken.focal_px is None or problem(own, state):
         return None
     metres = own.taken.focal_px / _fit(own, state, state.fitting).camera.s
     return metres if FIELDS["distance"].low <= metres <= FIELDS["distance"].high else None

@@ -17,13 +17,17 @@ from .text import distance_text, say
 
 def heading(own: OwnPhoto | None, state: ViewState) -> str:
     """The first words."""
-    words = problem(own)
-    if words:
-        lines = [words if own is None else say("own.start")]
+    if own is None:
+        lines = [say("own.none")]
+    elif own.asked or problem(own, state):
+        # The same while points are placed: the photograph below must not move under the hand
+        lines = [say("own.start")]
     else:
         assumed = None if state.camera == "orthographic" else state.distance
-        points = 0 if own is None else own.placed
-        lines = [say("own.lead", assumed=distance_text(assumed), points=points), say("own.try")]
+        lines = [
+            say("own.lead", assumed=distance_text(assumed), points=own.placed),
+            say("own.try"),
+        ]
     body = "".join(f"<p>{escape(line)}</p>" for line in lines)
     return f'<div class="fa"><h1>{escape(say("own.heading"))}</h1>{body}</div>'
 
@@ -37,25 +41,25 @@ def marks(own: OwnPhoto | None, scene: Scene) -> str:
     )
 
 
-def cards(own: OwnPhoto | None, scene: Scene, hide: tuple[str, ...]) -> str:
+def cards(own: OwnPhoto | None, state: ViewState, scene: Scene) -> str:
     """The two numbers, or what is missing for them."""
-    if words := problem(own):
+    if words := problem(own, state):
         return f'<div class="fa"><p class="fa-warn">{escape(words)}</p></div>'
-    return figures.cards(scene.numbers, hide=hide)
+    return figures.cards(scene.numbers, hide=state.hide)
 
 
 def curves(own: OwnPhoto | None, state: ViewState, scene: Scene) -> str:
     """Both plots; nothing without a fit."""
-    if own is None or problem(own):
+    if own is None or problem(own, state):
         return ""
     return plots.plots(own_curves(own, state), scene.numbers, hide=state.hide)
 
 
-def spoken(own: OwnPhoto | None, scene: Scene, hide: tuple[str, ...]) -> str:
+def spoken(own: OwnPhoto | None, state: ViewState, scene: Scene) -> str:
     """What a screen reader says at rest."""
-    if words := problem(own):
+    if words := problem(own, state):
         return f'<div class="fa-hidden" aria-live="polite">{escape(words)}</div>'
-    return figures.spoken(scene.numbers, hide=hide)
+    return figures.spoken(scene.numbers, hide=state.hide)
 
 
 def shown(own: OwnPhoto | None, status: str, *, can_undo: bool, hint: float | None) -> Shown:

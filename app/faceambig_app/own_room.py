@@ -15,6 +15,7 @@ from .own import OwnPhoto
 from .script import Click, Gone, Point
 from .text import say
 
+Make = Callable[[Any], OwnPhoto]
 STEPS = 100  # of point moves that can be taken back
 
 
@@ -34,7 +35,10 @@ class OwnRoom:
         self._past: list[OwnPhoto] = []  # the photograph with the points of before, oldest first
         self._dragged: int | None = None  # the point that a hand holds
         self._job = 0  # counts what was asked for: what comes late is not wanted any more
-        self._busy: asyncio.Task[None] | None = None
+        self._todo: tuple[int, Make, Callable[[OwnPhoto], None]] | None = None
+        self._busy: asyncio.Task[None] | None = (
+            None  # a thread works; it holds what it was given until it ends
+        )
 
     @property
     def can_undo(self) -> bool:
@@ -44,9 +48,7 @@ class OwnRoom:
     def leave(self) -> None:
         """Keep nothing: the browser has gone."""
         self._job += 1
-        if self._busy is not None:
-            self._busy.cancel()
-        self.photo, self._busy = None, None
+        self.photo, self._todo = None, None
         self._past.clear()
 
     def remove(self) -> None:
@@ -67,6 +69,9 @@ class OwnRoom:
 
     def find(self) -> None:
         """Find the points."""
+        if self.photo is None:
+            self._notice(say("own.none"))
+            return
         self._work(say("own.finding"), lambda photo: own.found(photo, model(self.model)))
 
     def read_points(self, name: str, data: bytes) -> None:
@@ -79,32 +84,34 @@ class OwnRoom:
         )
 
     def _work(
-        self, words: str, make: Callable[[Any], OwnPhoto], done: Callable[[OwnPhoto], None] | None = None
+        self, words: str, make: Make, done: Callable[[OwnPhoto], None] | None = None
     ) -> None:  # fmt: skip
-        """Make a photograph of this one in another thread, and show it unless something else was asked meanwhile."""
+        """Make a photograph of this one in another thread, and show it unless something else was asked meanwhile.
+
+        One at a time for each browser: what is asked while another runs waits, and the last that was asked counts.
+        """
         self._job += 1
-        job, photo = self._job, self.photo
-        if self._busy is not None:
-            self._busy.cancel()
+        self._todo = (self._job, make, done or (lambda made: self._step(made, made.words)))
         self.status = words
         self._changed()
+        if self._busy is None:
+            self._busy = self._loop.create_task(self._run())
 
-        async def run() -> None:
+    async def _run(self) -> None:
+        while self._todo is not None:
+            (job, make, done), self._todo = self._todo, None
             try:
-                made = await self._loop.run_in_executor(None, make, photo)
-            except ValueError as error:
+                made = await self._loop.run_in_executor(None, make, self.photo)
+            except Exception as error:  # noqa: BLE001 - a stranger's file; the browser goes on, and is told
                 if job == self._job:
                     self.status = str(error)
-                    self._notice(str(error))
+                    self._notice(self.status)
                     self._changed()
-                return
-            if job == self._job:
-                if done is None:
-                    self._step(made, made.words)
-                else:
+            else:
+                if job == self._job:
                     done(made)
-
-        self._busy = self._loop.create_task(run())
+                del made
+        self._busy = None
 
     # ------------------------------------------------------------ points by hand
 

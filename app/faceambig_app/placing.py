@@ -66,7 +66,7 @@ def asked_words(own: OwnPhoto) -> str:
         return ""
     name = own.asked[0]
     words = say("own.place", name=say(f"point.{name}"), left=len(own.asked))
-    return f'<div class="fa fa-ask">{_drawing(own)}<p aria-live="polite">{escape(words)}</p></div>'
+    return f'<div class="fa fa-ask" data-fa-ask="1">{_drawing(own)}<p aria-live="polite">{escape(words)}</p></div>'
 
 
 def _drawing(own: OwnPhoto) -> str:

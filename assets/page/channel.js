@@ -21,6 +21,7 @@
 //   data-fa-photo="WIDTHxHEIGHT"          an element whose box shows a photograph of so many pixels
 //   data-fa-view="X,Y,WIDTH,HEIGHT"       on it: the part in the box, in pixels of the photograph; else all of it
 //   data-fa-place="1"                     on it: a click places a point
+//   data-fa-ask="1"                       what to place: it comes into view when placing begins
 //   <g data-fa-point="INDEX" data-fa-at="X,Y">  in an SVG in it: a point that a hand or arrow keys move
 //
 // Page -> server: one JSON object of one key as the value of the text control; script.py reads them. Pixels count from

@@ -83,7 +83,12 @@ function forget() {
 
 // After the server has drawn the photograph anew.
 const known = new WeakSet();
+let asking = false;
 function readPhoto() {
+  const asks = document.querySelector("[data-fa-photo][data-fa-place]") !== null;
+  // What is asked for, and the photograph below it: on a telephone the button that began this is a page below
+  if (asks && !asking) document.querySelector("[data-fa-ask]")?.scrollIntoView({ block: "nearest" });
+  asking = asks;
   for (const index of moved.keys()) {
     if (index !== drag?.index && !pointOf(index)) moved.delete(index);
   }

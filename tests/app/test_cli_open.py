@@ -21,6 +21,7 @@ from commands import RECORD, printed, refused, write_pts
 from faceambig.io.fits import encode_fit
 from faceambig.metrics import surface_difference
 from faceambig_app import photo, sheets
+from faceambig_app.files import write_pairs
 from faceambig_app.commands import progress
 from scenes import need_renderer
 

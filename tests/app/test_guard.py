@@ -115,6 +115,7 @@ class Tiny:
     server: viser.ViserServer
     refused: list[tuple[int, str]] = field(default_factory=list)
     errors: list[tuple[int | None, str]] = field(default_factory=list)
+    files: list[tuple[str, bytes]] = field(default_factory=list)
     clients: dict[int, dict[str, Any]] = field(default_factory=dict)
 
     @property
@@ -187,6 +188,9 @@ def tiny() -> Iterator[Tiny]:
         def breaks_in_a_thread(_event: object) -> None:
             raise ValueError("in a thread")
 
+        controls["take"] = guard.add_upload(
+            client.gui, "Take", "image/png", lambda name, data: page.files.append((name, data))
+        )
         controls["press"].on_click(breaks)
         controls["view"].on_update(breaks_in_a_thread)
         page.clients[client.client_id] = controls | {"client": client, "mark": client.camera.far}
@@ -200,6 +204,7 @@ def tiny() -> Iterator[Tiny]:
 def forget(tiny: Tiny) -> None:
     tiny.refused.clear()
     tiny.errors.clear()
+    tiny.files.clear()
 
 
 # ---------------------------------------------------------------- starting
@@ -389,6 +394,91 @@ def test_there_is_no_tunnel(tiny: Tiny) -> None:
         browser.send({"type": "ShareUrlRequest"})
         browser.read(0.2)
         assert tiny.server._share_tunnel is None
+
+
+# ---------------------------------------------------------------- uploads
+
+PART = 512 * 1024
+
+
+def begin(
+    control: Any, transfer: str, size: int, *, name: str = "me.png", parts: int | None = None
+) -> dict[str, Any]:
+    count = -(-size // PART) if parts is None else parts
+    return {
+        "type": "FileTransferStartUpload", "source_component_uuid": control._impl.uuid, "transfer_uuid": transfer,
+        "filename": name, "mime_type": "image/png", "part_count": count, "size_bytes": size,
+    }  # fmt: skip
+
+
+def piece(control: Any, transfer: str, index: int, content: bytes) -> dict[str, Any]:
+    return {
+        "type": "FileTransferPart", "source_component_uuid": control._impl.uuid, "transfer_uuid": transfer,
+        "part_index": index, "content": content,
+    }  # fmt: skip
+
+
+def on_the_way(client: Any) -> int:
+    """Bytes held of files that are being sent."""
+    states = client.gui._current_file_upload_states.values()
+    return sum(len(part) for state in states for part in state["parts"].values())
+
+
+def test_a_file_is_taken_whole_and_the_control_keeps_nothing(tiny: Tiny) -> None:
+    with tiny.browser() as (browser, controls):
+        take, data = controls["take"], bytes(range(256)) * 2500  # two parts
+        browser.send(begin(take, "a", len(data), name="C:\\own\\..\\me\x1b<b>.png"))
+        for index in (1, 0, 0):  # in any order, and once too often
+            browser.send(piece(take, "a", index, data[index * PART : (index + 1) * PART]))
+        assert until(lambda: tiny.files)
+        assert tiny.files == [("me__b_.png", data)]
+        assert take.value.content == b""
+        assert on_the_way(controls["client"]) == 0
+    assert not tiny.refused
+    assert not tiny.errors
+
+
+def test_files_that_are_not_offered_or_too_large_are_not_begun(tiny: Tiny) -> None:
+    with tiny.browser() as (browser, controls):
+        take = controls["take"]
+        most = guard.MAX_UPLOAD
+        bad = [
+            begin(take, "large", most + 1), begin(take, "none", 0), begin(take, "lie", 5, parts=2),
+            begin(controls["upload"], "unheard", 5), begin(controls["slider"], "slider", 5),
+        ]  # fmt: skip
+        for message in bad:
+            browser.send(message)
+            browser.send(piece(take, message["transfer_uuid"], 0, b"12345"))
+        browser.send(begin(take, "half", most // 2 + 1))
+        browser.send(begin(take, "other", most // 2))  # together more than one may send
+        browser.send(begin(take, "small", 5))
+        browser.send(begin(take, "third", 5))
+        browser.send(piece(take, "small", 0, b"123456"))  # longer than it said
+        browser.send(piece(take, "small", 7, b"12345"))
+        browser.send(piece(take, "half", 0, bytes(PART - 1)))  # shorter than a part is
+        browser.set(controls["steps"], 7)
+        assert until(lambda: controls["steps"].value == 7)
+        states = controls["client"].gui._current_file_upload_states
+        assert set(states) == {"half", "small"}
+        assert on_the_way(controls["client"]) == 0
+        assert len(tiny.refused) == 5  # too large, empty, a lie, together too much, a third
+        browser.send(piece(take, "small", 0, b"12345"))
+        assert until(lambda: tiny.files) == [("me.png", b"12345")]
+
+
+def test_nobody_sends_for_another_and_what_is_half_sent_goes_with_the_browser(tiny: Tiny) -> None:
+    with tiny.browser() as (browser, controls), tiny.browser() as (other, others):
+        take, gui = controls["take"], controls["client"].gui
+        browser.send(begin(take, "mine", PART + 5))
+        browser.send(piece(take, "mine", 0, bytes(PART)))
+        assert until(lambda: on_the_way(controls["client"]) == PART)
+        other.send(piece(take, "mine", 1, b"54321"))
+        other.set(others["steps"], 3)
+        assert until(lambda: others["steps"].value == 3)
+        assert on_the_way(controls["client"]) == PART
+        browser.socket.close()
+        assert until(lambda: not gui._current_file_upload_states)
+    assert not tiny.files
 
 
 # ---------------------------------------------------------------- values
