@@ -19,9 +19,11 @@ from .forms import command
 from .glide import Glide
 from .link import query
 from .notices import from_query
+from .orders import Orders
 from .panel import Change, Panel
 from .pipeline import Frame, curve_key, curve_of, frame, model, photo_jpeg
 from .room import Dispatcher, Room
+from .saving import Saving
 from .script import Copied, Dark, Hello, Key, Report, Script, Theme, is_dark
 from .stage import Stage
 from .state import DEFAULT, ViewState, changed
@@ -39,7 +41,11 @@ class Browser:
     """One connected browser: widgets, nodes and figures of its room."""
 
     def __init__(
-        self, client: viser.ClientHandle, dispatcher: Dispatcher, loop: AbstractEventLoop
+        self,
+        client: viser.ClientHandle,
+        dispatcher: Dispatcher,
+        orders: Orders,
+        loop: AbstractEventLoop,
     ) -> None:
         self._client, self._loop = client, loop
         self.room = Room(DEFAULT, self, dispatcher.ring)
@@ -55,7 +61,14 @@ class Browser:
         people = {
             index: subject.name for index, subject in enumerate(model(DEFAULT.model).subjects, 1)
         }
-        self.panel = Panel(client.gui, people, self.change, self.act, narrow=self.stage.narrow)
+        self._saving = Saving(
+            client, loop, orders, now=lambda: self.room.state, go=self._opened,
+            show=lambda shown: self.panel.export.show(shown), notice=self.notice,
+        )  # fmt: skip
+        self.panel = Panel(
+            client.gui, people, self.change, self.act, narrow=self.stage.narrow,
+            saving=self._saving,
+        )  # fmt: skip
         style = STYLE + figures.hidden_boxes(self.panel.widgets.step_sliders)
         self.panel.places.style.content = style
         self.panel.show(self.room.state)
@@ -70,6 +83,7 @@ class Browser:
     def leave(self) -> None:
         """The browser has gone: compute nothing more for it."""
         self.room.left = True
+        self._saving.leave()
         self._glide.stop()
 
     def change(self, change: Change) -> None:
@@ -117,6 +131,10 @@ class Browser:
             self._dress()
             self.script.theme(cast(Theme, to.now.theme), to.now.text)
         self.panel.show(to.now)
+
+    def _opened(self, state: ViewState) -> None:
+        """A state came in a file."""
+        self.change(lambda _: state)
 
     def _orbited(self, azimuth: float, elevation: float, zoom: float) -> None:
         """A hand has turned the viewer, who stands there already: the state learns it, nothing is drawn."""

@@ -24,7 +24,7 @@ from faceambig.model import FaceModel, Subject
 from faceambig.observation import portrait_camera
 from faceambig.scene import Curves, Photo, Scene
 
-from .forms import to_json
+from .origin import origin
 from .state import DEFAULT, Bend, Fitting, Look, Target, ViewState
 from .text import centimetres, distance_text, percent_number, say
 
@@ -244,10 +244,7 @@ def snapshot(
 
     picture = draw(frame(state).scene, width, height)
     if path is not None:
-        write(
-            Path(path),
-            encode_png(picture, {"Software": "faceambig", "ViewState": to_json(state)}),
-        )
+        write(Path(path), encode_png(picture, origin(state, model(state.model))))
     return picture
 
 

@@ -22,7 +22,7 @@ class Widget:
     def on_update(self, listener: Any) -> None:
         self.listener = listener
 
-    on_click = on_update
+    on_click = on_upload = on_update
 
     def add_tab(self, label: str) -> Widget:
         return Widget(label)
@@ -52,11 +52,14 @@ class Gui:
         return add
 
 
-def panel_of(state: ViewState) -> tuple[Panel, Gui, list[Change], list[str]]:
+def panel_of(state: ViewState, saving: Any = None) -> tuple[Panel, Gui, list[Change], list[str]]:
     gui, told, acts = Gui(), [], []
     made: Any = gui  # a stand-in
     made.main_panel = MagicMock()
-    panel = Panel(made, {1: "a", 2: "b", 3: "c"}, told.append, acts.append, narrow=True)
+    panel = Panel(
+        made, {1: "a", 2: "b", 3: "c"}, told.append, acts.append, narrow=True,
+        saving=saving or MagicMock(),
+    )  # fmt: skip
     panel.show(state)
     return panel, gui, told, acts
 

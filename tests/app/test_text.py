@@ -82,7 +82,9 @@ def recorded(monkeypatch: pytest.MonkeyPatch) -> set[str]:
 
 def test_every_word_of_the_file_is_asked_for(recorded):
     # keys put together from names are those that a real panel looks up
-    shown = panel.Panel(MagicMock(), {1: "a"}, lambda _: None, lambda _: None, narrow=False)
+    shown = panel.Panel(
+        MagicMock(), {1: "a"}, lambda _: None, lambda _: None, narrow=False, saving=MagicMock()
+    )
     shown.spoken(DEFAULT)
     exact = {ask.replace("\\", "") for _, ask in ASKED if "[" not in ask}
     commands = {f"action.{name}{end}" for name in ACTIONS for end in ("", "_hint")}

@@ -19,6 +19,7 @@ from viser.infra import _infra
 from .door import DOOR, VISER, Door, ServeError, log_line
 from .messages import MAX_MESSAGE, consume, dispatch
 from .requests import answer, dress
+from .uploads import part, start
 from .values import update
 
 QUIET = logging.getLogger(f"{__package__}.websockets")  # its news is scanners and closed laptops
@@ -67,6 +68,8 @@ def install() -> None:
         (_infra, "_message_consumer", consume),
         (_infra.WebsockMessageHandler, "_handle_incoming_message", dispatch),
         (_gui_api.GuiApi, "_handle_gui_updates", update),
+        (_gui_api.GuiApi, "_handle_file_transfer_start", start),
+        (_gui_api.GuiApi, "_handle_file_transfer_part", part),
         (_viser, "ViserTunnel", _NoTunnel),
         (_client_autobuild, "ensure_client_is_built", lambda: None),  # it would call npm
     ]

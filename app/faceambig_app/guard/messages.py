@@ -15,6 +15,7 @@ from .door import DOOR, log_line
 MAX_MESSAGE = 768 * 1024  # bytes; an upload arrives in parts of 512 KiB
 MAX_BAD = 40  # messages that mean nothing, before the connection is closed
 SIDE = 65_536  # pixels of a canvas
+MAX_NAME = 1_000  # characters of a file's name: systems allow 255 bytes
 
 real_consumer = _infra._message_consumer
 real_dispatch = _infra.WebsockMessageHandler._handle_incoming_message
@@ -68,13 +69,20 @@ def _vector(value: object, size: int) -> bool:
     return isinstance(value, list) and len(value) == size and all(map(is_number, value))
 
 
-def _name(value: object) -> bool:
-    return isinstance(value, str) and len(value) <= 64
+def _text(value: object, most: int) -> bool:
+    return isinstance(value, str) and len(value) <= most
+
+
+def _count(value: object) -> bool:
+    return isinstance(value, int) and is_number(value, 0, 2**53)
+
+
+_name = partial(_text, most=64)
 
 
 _positive = partial(is_number, low=1e-9)
 _side = partial(is_number, low=0, high=SIDE)
-# What a browser may say. Not here, so dropped: the public tunnel, rendered pictures, local storage, uploads.
+# What a browser may say. Not here, so dropped: the public tunnel, rendered pictures, local storage.
 FIELDS: Mapping[str, Mapping[str, Callable[[Any], bool]]] = {
     "ViewerCameraMessage": {
         "wxyz": partial(_vector, size=4),
@@ -89,6 +97,21 @@ FIELDS: Mapping[str, Mapping[str, Callable[[Any], bool]]] = {
     },
     "GuiUpdateMessage": {"uuid": _name, "updates": lambda value: isinstance(value, dict)},
     "CommandTriggerMessage": {"uuid": _name},
+    # Which of them are taken: uploads.py
+    "FileTransferStartUpload": {
+        "source_component_uuid": _name,
+        "transfer_uuid": _name,
+        "filename": partial(_text, most=MAX_NAME),
+        "mime_type": partial(_text, most=MAX_NAME),
+        "part_count": _count,
+        "size_bytes": _count,
+    },
+    "FileTransferPart": {
+        "source_component_uuid": _name,
+        "transfer_uuid": _name,
+        "part_index": _count,
+        "content": lambda value: isinstance(value, bytes),
+    },
 }
 
 

@@ -14,7 +14,7 @@ import viser
 from ..guard import data_html
 from ..state import ViewState
 from ..text import distance_text, say
-from . import compare, explore, flex, view
+from . import compare, explore, export, flex, view
 from .widgets import Change as Change
 from .widgets import Tell, Widgets
 
@@ -54,6 +54,7 @@ class Panel:
         act: Callable[[str], None],
         *,
         narrow: bool,
+        saving: export.Does,
     ) -> None:
         self.widgets = w = Widgets(gui, tell, act)
         gui.set_panel_label(say("app.title"))
@@ -78,6 +79,8 @@ class Panel:
             view.build(w)
         with tabs.add_tab(say("panel.compare")):
             pins = compare.build(w)
+        with tabs.add_tab(say("panel.export")):
+            self.export = export.build(w, saving)
         spoken, data = gui.add_html(""), gui.add_html("")
         gui.main_panel.dock_right()
         gui.main_panel.set_width(SIDE_WIDTH)
