@@ -38,6 +38,8 @@ class Saving:
         self._client, self._loop, self._orders = client, loop, orders
         self._now, self._go, self._show, self._notice = now, go, show, notice
         self._left = False
+        self._number = 0  # of what was stopped: what is heard of an older order comes too late
+        self._note: viser.NotificationHandle | None = None  # seen from any tab while there is work
 
     # ---------------------------------------------------------------- what a person does, on the loop
 
@@ -54,7 +56,8 @@ class Saving:
     def stop(self) -> None:
         """Take the order back."""
         if self._orders.stop(self):
-            self._show(Shown(say("export.stopped")))
+            self._number += 1
+            self._put(Shown(say("export.stopped")))
 
     def open(self, name: str, data: bytes) -> None:
         """Go to the state of a file; a red line if it is none."""
@@ -100,13 +103,32 @@ class Saving:
         self._tell(Shown(), partial(self._notice, say("export.failed", cause=str(error))))
 
     def _tell(self, shown: Shown, also: Callable[[], None] | None = None) -> None:
+        number = self._number
+
         def told() -> None:
-            if not self._left:
-                self._show(shown)
+            if not self._left and number == self._number:
+                self._put(shown)
                 if also is not None:
                     also()
 
         self._loop.call_soon_threadsafe(told)
+
+    def _put(self, shown: Shown) -> None:
+        """In the tab, and where it is seen from every other one."""
+        self._show(shown)
+        if shown.busy and self._note is not None:
+            self._note.body = shown.words
+            return
+        if self._note is not None:
+            self._note.remove()
+            self._note = None
+        if shown.words:
+            self._note = self._client.add_notification(
+                say("app.title"), shown.words, loading=shown.busy, with_close_button=not shown.busy,
+                auto_close_seconds=None if shown.busy else 4.0,
+            )  # fmt: skip
+        if not shown.busy:
+            self._note = None  # closes itself
 
 
 def size_text(n_bytes: int) -> str:

@@ -9,6 +9,7 @@ import pytest
 
 from faceambig.render.overlay import encode_png
 from faceambig_app import ViewState, snapshot
+from faceambig_app.pipeline import model
 from faceambig_app.state import changed
 from scenes import GOLDEN, need_renderer
 
@@ -76,3 +77,6 @@ def test_the_picture_carries_its_state(tmp_path):
     snapshot(ViewState(subject=4, distance=0.6), tmp_path / "a.png", width=640, height=400)
     with PngImageFile(tmp_path / "a.png") as picture:
         assert picture.text["ViewState"] == '{"subject":4,"distance":0.6}'
+        assert picture.text["Software"].startswith("faceambig 0.")
+        assert picture.text["Model"].startswith("embedded")
+        assert picture.text["Licence"] == model("embedded").licence

@@ -14,9 +14,10 @@ from ..guard import add_upload
 from ..state import ViewState
 from ..text import say
 from .explore import folder
+from .flex import LETTERS
 from .widgets import Listener, Widgets
 
-STATES = ".json,application/json"  # what the browser offers to open
+STATES = ".json"  # what the browser offers to open
 SCALES = (1, 2, 4)
 MESHES = ("ply", "obj", "glb")
 
@@ -130,7 +131,9 @@ def _build_numbers(w: Widgets, does: Does) -> None:
 
 def _build_moving(w: Widgets, does: Does, with_own: Callable[[], dict[str, bool]]) -> None:
     """The way of the distance or of a mode: a page has all modes, a picture one."""
-    modes = {say("player.mode", letter=letter): mode for mode, letter in enumerate("ABC", start=1)}
+    modes = {
+        say("player.mode", letter=letter): mode for mode, letter in enumerate(LETTERS, start=1)
+    }
     whats = {say("field.distance"): 0, **modes}
     kinds = {say("export.page"): "html", "WebP": "webp", "GIF": "gif"}
     with folder(w, "moving"):
