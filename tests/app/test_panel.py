@@ -17,7 +17,8 @@ class Widget:
     """Keeps its listener, as viser's handles do."""
 
     def __init__(self, label: str, *_: Any, **__: Any) -> None:
-        self.label, self.value = label, None
+        self.label = label
+        self.value: Any = None
         self._impl = SimpleNamespace(uuid=label)
 
     def on_update(self, listener: Any) -> None:
