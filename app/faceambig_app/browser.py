@@ -24,12 +24,14 @@ from .forms import command
 from .glide import Glide
 from .link import query
 from .notices import from_query
+from .orders import Orders
 from .own import OwnFrame, OwnPhoto, own_frame, told_distance
 from .own_room import OwnRoom
 from .panel import Change, Panel
 from .panel.widgets import setting
 from .pipeline import Frame, frame, plots_of
 from .room import Dispatcher, Room
+from .saving import Saving
 from .scenes import photo_jpeg
 from .script import (
     Click,
@@ -61,7 +63,11 @@ class Browser:
     """One connected browser: widgets, nodes and figures of its room."""
 
     def __init__(
-        self, client: viser.ClientHandle, dispatcher: Dispatcher, loop: AbstractEventLoop
+        self,
+        client: viser.ClientHandle,
+        dispatcher: Dispatcher,
+        orders: Orders,
+        loop: AbstractEventLoop,
     ) -> None:
         self._client, self._loop = client, loop
         self.room = Room(DEFAULT, self, dispatcher.ring)
@@ -85,9 +91,13 @@ class Browser:
         self._hint: float | None = (
             None  # metres: of the camera, as the own photograph's file tells it
         )
+        self._saving = Saving(
+            client, loop, orders, now=lambda: self.room.state, go=self._opened,
+            show=lambda shown: self.panel.export.show(shown), notice=self.notice,
+        )  # fmt: skip
         self.panel = Panel(
             client.gui, people, self.change, self.act, narrow=self.stage.narrow,
-            own=self._own, use_hint=self._use_hint,
+            own=self._own, use_hint=self._use_hint, saving=self._saving,
         )  # fmt: skip
         style = STYLE + figures.hidden_boxes(self.panel.widgets.step_sliders)
         self.panel.places.style.content = style
@@ -104,6 +114,7 @@ class Browser:
         """The browser has gone: compute nothing more for it."""
         self.room.left = True
         self._own.leave()
+        self._saving.leave()
         self._glide.stop()
 
     def change(self, change: Change) -> None:
@@ -156,6 +167,10 @@ class Browser:
             self._dress()
             self.script.theme(cast(Theme, to.now.theme), to.now.text)
         self.panel.show(to.now)
+
+    def _opened(self, state: ViewState) -> None:
+        """A state came in a file."""
+        self.change(lambda _: state)
 
     def _orbited(self, azimuth: float, elevation: float, zoom: float) -> None:
         """A hand has turned the viewer, who stands there already: the state learns it, nothing is drawn."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import io
+import itertools
 import json
 import math
 from collections.abc import Callable, Mapping
@@ -38,9 +39,13 @@ MESHES: Mapping[str, Callable[[Mesh], bytes]] = {
     "glb": encode_glb,
 }
 KINDS = ("png", *MESHES, "csv", "json", "state", "html", "webp", "gif")
+LONG = ("png", "html", "webp", "gif")  # what takes seconds or more
+Progress = Callable[[int, int], None]  # how much is done, of how much; what it raises ends the work
 
 
-def files(state: ViewState, kind: str, **options: Any) -> tuple[str, bytes]:
+def files(
+    state: ViewState, kind: str, *, progress: Progress | None = None, **options: Any
+) -> tuple[str, bytes]:
     """(name, contents) of a state as a file of one of KINDS.
 
     Parameters
@@ -48,12 +53,15 @@ def files(state: ViewState, kind: str, **options: Any) -> tuple[str, bytes]:
     options: of "png": scale (1, 2 or 4), transparent, overlays, own_photo; see `picture`. Of "ply", "obj", "glb":
         face ("fit" or "true"). Of "html": whats, own_photo; see `player.page`. Of "webp", "gif": those of
         `animate.animation`. "csv" and "json" are the numbers, "state" the JSON that `ViewState` reads; they have none.
+    progress: called with what is done, of how much, while one of LONG is made; what it raises ends the work.
 
     Raises
     ------
     ValueError: no such kind, or an option's value. TypeError: an option the kind does not have.
     NoRendererError: a picture or an animation where there is no OpenGL.
     """
+    if kind in LONG:
+        options["progress"] = progress
     if kind == "png":
         return picture(state, **options)
     if kind in MESHES:
@@ -80,6 +88,7 @@ def picture(
     transparent: bool = False,
     overlays: bool = True,
     own_photo: bool = False,
+    progress: Progress | None = None,
 ) -> tuple[str, bytes]:
     """The snapshot as a PNG of `scale` times 1440 x 900, a strip 1600 x 760.
 
@@ -91,8 +100,18 @@ def picture(
         raise ValueError(f"scale: {scale!r} is not one of {', '.join(map(str, SCALES))}")
     scene = pipeline.frame(state).scene
     scene = scene if own_photo else without_own_photo(scene)
-    rgba = draw(scene, scale=scale, transparent=transparent, overlays=overlays)
+    step = None if progress is None else _counted(scene, progress)
+    rgba = draw(scene, scale=scale, transparent=transparent, overlays=overlays, step=step)
+    if progress is not None:
+        progress(1, 1)
     return file_name(shown(state), "png"), encode_png(rgba, provenance(state))
+
+
+def _counted(scene: Scene, progress: Progress) -> Callable[[], None]:
+    """What tells the progress of a picture of a scene: before each head and photograph, how many are done."""
+    drawn = itertools.count()
+    pictures = 2 if scene.through_camera else 1 + len(scene.heads) * len(scene.views)
+    return lambda: progress(min(next(drawn), pictures), pictures + 1)  # then the file is written
 
 
 def without_own_photo(scene: Scene) -> Scene:

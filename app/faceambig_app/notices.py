@@ -1,4 +1,4 @@
-"""What was found in a link, in words."""
+"""What was found in a link or in a file of a state, in words."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from collections.abc import Collection
 
 from . import link
 from .fields import FIELDS
-from .forms import LONGEST
+from .forms import LONGEST, from_json
 from .link import Finding
-from .state import DEFAULT, ViewState
+from .state import DEFAULT, ViewState, changed
 from .text import say
 
 NAMED = 5  # names of settings in one notice
@@ -23,6 +23,22 @@ def from_query(
     """
     state, findings = link.read(text, models)
     return state, tuple(words(finding) for finding in findings)
+
+
+def from_file(
+    data: bytes, models: Collection[str] = (DEFAULT.model,)
+) -> tuple[ViewState, tuple[str, ...]]:
+    """The state of a JSON file, and a sentence for each thing that its reader should know; ValueError if it is none.
+
+    models: those that a file may name; of its own a stranger's file must not make this machine open a path.
+    """
+    state, found = from_json(data), []
+    if state.model not in models:
+        found.append(words(Finding("model", ("model",), link.shown(state.model))))
+        state = changed(state, model=DEFAULT.model)
+    if state.subject == "photo":
+        found.append(say("export.needs_photo"))
+    return state, tuple(found)
 
 
 def words(finding: Finding) -> str:

@@ -27,9 +27,9 @@ from .fits import fitted as fitted
 from .fits import model as model
 from .fits import n_fitted
 from .fits import photograph as photograph
-from .forms import to_json
 from .likely import bending as bending
 from .likely import source, spread
+from .origin import origin
 from .scenes import photo_jpeg as photo_jpeg
 from .scenes import picture as picture
 from .scenes import scene_of
@@ -129,8 +129,5 @@ def snapshot(
 
     drawn = draw(frame(state).scene, width, height)
     if path is not None:
-        write(
-            Path(path),
-            encode_png(drawn, {"Software": "faceambig", "ViewState": to_json(state)}),
-        )
+        write(Path(path), encode_png(drawn, origin(state, model(state.model))))
     return drawn

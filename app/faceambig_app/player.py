@@ -7,7 +7,7 @@ standalone.py how it is written.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -62,20 +62,31 @@ AMBIENT, OCCLUSION_POWER = 0.75, 1.3
 
 
 def page(
-    state: ViewState, *, whats: Sequence[str] = ("distance",), own_photo: bool = False
+    state: ViewState,
+    *,
+    whats: Sequence[str] = ("distance",),
+    own_photo: bool = False,
+    progress: Callable[[int, int], None] | None = None,
 ) -> tuple[str, bytes]:
     """(name, contents) of the HTML file: the way along the distance, or the swings of modes A, B, C, or both.
 
     whats: of WHATS. own_photo: a photograph of one's own goes into the file; a synthetic one always does.
+    progress: called with the parts of the work that are done, of how many; what it raises ends the work.
     """
     if not whats or any(what not in WHATS for what in whats):
         raise ValueError(f"whats: {', '.join(whats)!r} is not one or more of {', '.join(WHATS)}")
     state = changed(state, show="both")
-    tracks = tracks_of(state, whats)
+    told = progress or (lambda _done, _of: None)
+    tracks = []
+    for done, what in enumerate(whats):
+        told(done, len(whats) + 2)
+        tracks += tracks_of(state, (what,))
+    told(len(whats), len(whats) + 2)
     scene = pipeline.frame(state, with_curves=False).scene
     own = scene.photo.pixels is not None
     photo = scene.photo if own_photo or not own else replace(scene.photo, pixels=None)
     data, geometry = contents(state, scene, tracks)
+    told(1, 1)
     words = "_".join((shown(state) if "mode" in whats else who(state), *whats))
     said = say("player.left_out") if own and not own_photo else ""
     text = html(state, tracks, photo, data, geometry, said=said)

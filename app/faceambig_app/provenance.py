@@ -2,22 +2,14 @@
 
 from __future__ import annotations
 
-from importlib.metadata import version
-
 from .fits import model
-from .forms import to_json
+from .origin import origin
 from .state import ViewState
 
 
 def provenance(state: ViewState) -> dict[str, str]:
-    """Where a file comes from, by name: enough to make it again. Names are those of PNG's text where it has one."""
-    face = model(state.model)
-    return {
-        "Software": f"faceambig {version('faceambig')}",
-        "ViewState": to_json(state),
-        "Model": f"{face.name}: {face.source}",
-        "Licence": face.licence,
-    }
+    """Where a file comes from, by name: enough to make it again."""
+    return origin(state, model(state.model))
 
 
 def notes(state: ViewState) -> tuple[str, ...]:

@@ -18,7 +18,9 @@ from . import guard
 from .browser import Browser
 from .fields import FIELDS
 from .fits import model
+from .orders import Orders
 from .panel.data import POINTS
+from .panel.export import STATES
 from .pipeline import frame
 from .room import Dispatcher
 from .stage import FAR, FIRST_FOV, FIRST_POSITION, NEAR
@@ -32,7 +34,7 @@ class Page:
     def __init__(self, host: str, port: int) -> None:
         model(DEFAULT.model)  # before the first browser comes
         frame(DEFAULT)
-        self._dispatcher = Dispatcher()
+        self._dispatcher, self._orders = Dispatcher(), Orders()
         self._browsers: dict[int, Browser] = {}
         hooks = guard.Hooks(words=refusal, on_refused=self._refused, on_error=self._failed)
         self._server = guard.start(
@@ -50,7 +52,7 @@ class Page:
     async def _enter(
         self, client: viser.ClientHandle
     ) -> None:  # async: on the loop, before any message of this client
-        browser = Browser(client, self._dispatcher, asyncio.get_running_loop())
+        browser = Browser(client, self._dispatcher, self._orders, asyncio.get_running_loop())
         self._browsers[client.client_id] = browser
         browser.open()
 
@@ -77,6 +79,7 @@ class Page:
 
     def close(self) -> None:
         """Stop serving; returns within two seconds."""
+        self._orders.close()
         self._dispatcher.close()
         self._server.stop()
 
@@ -84,6 +87,8 @@ class Page:
 def refusal(control: Any, asked: object, put: object) -> str:
     """The notice for a value a control may not have."""
     if isinstance(control, viser.GuiUploadButtonHandle):
+        if control.mime_type == STATES:
+            return say("export.not_taken")
         if control.mime_type == POINTS:
             return say("own.points_large")
         return say("own.unreadable")

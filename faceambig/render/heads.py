@@ -68,6 +68,7 @@ def standing(
     for head in heads:
         key = (head.name, view)
         if key not in sheet.pictures.heads:
+            sheet.pictures.step()
             sheet.pictures.heads[key] = gl.render_layer(
                 head, view, *size, ppm * unit, middle=aim, marked=sheet.scene.landmarks
             )

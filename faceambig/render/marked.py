@@ -21,6 +21,7 @@ def photograph(sheet: Sheet, x: float, y: float, width: float, *, fit: bool = Fa
     """The photograph, or the fitted face through its own camera, with what the scene lays over it."""
     photo = sheet.scene.photo
     if fit not in sheet.pictures.photographs:
+        sheet.pictures.step()
         sheet.pictures.photographs[fit] = _pixels(sheet, round(width * sheet.canvas.unit), fit)
     picture = sheet.pictures.photographs[fit]
     at = np.array(sheet.canvas.paste(x, y, picture, radius=8))

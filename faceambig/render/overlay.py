@@ -37,13 +37,15 @@ def draw(
     transparent: bool = False,
     overlays: bool = True,
     words: Mapping[str, str] = WORDS,
+    step: Callable[[], None] | None = None,
 ) -> Picture:
     """(H, W, 4) RGBA picture of a scene, H = scale * height and W = scale * width.
 
     width, height: pixels at scale 1; by default 1440 x 900, a strip 1600 x 760. transparent: nothing behind heads
     and words. overlays: False leaves out all words, marks, lines, numbers and scales: the heads alone, or, through
-    the camera, both photographs. words: replaces some of WORDS. ValueError for a size out of range, NoRendererError
-    where heads are to be drawn and there is no OpenGL.
+    the camera, both photographs. words: replaces some of WORDS. step: called before each head and photograph, which is
+    what takes long; what it raises ends the drawing. ValueError for a size out of range, NoRendererError where heads
+    are to be drawn and there is no OpenGL.
     """
     layout, least = _layout(scene) if overlays else (_bare, _layout(scene)[1])
     asked = (least[0] if width is None else width, least[1] if height is None else height)
@@ -53,7 +55,7 @@ def draw(
             raise ValueError(f"{name}: {side} pixels, expected {SMALLEST} to {LARGEST}")
     unit = min(size[0] / least[0], size[1] / least[1])
     words = {**WORDS, **words}
-    pictures = Pictures()
+    pictures = Pictures() if step is None else Pictures(step=step)
 
     def drawn(ground: Colour, panel: Colour) -> Picture:
         canvas = Canvas(size, unit, ground)

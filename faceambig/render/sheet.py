@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from ..scene import Scene, View
@@ -47,6 +47,7 @@ class Pictures:
 
     heads: dict[tuple[str, View], Layer] = field(default_factory=dict)
     photographs: dict[bool, Picture] = field(default_factory=dict)  # True: through the fit's camera
+    step: Callable[[], None] = lambda: None  # called before each of them
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,6 +12,7 @@ import numpy as np
 from faceambig_app import figures
 from faceambig_app.actions import ACTIONS
 from faceambig_app.panel import Change, Panel
+from faceambig_app.panel.export import Shown
 from faceambig_app.state import DEFAULT, ViewState, changed
 
 
@@ -57,19 +58,14 @@ class Gui:
         return add
 
 
-def panel_of(state: ViewState) -> tuple[Panel, Gui, list[Change], list[str]]:
+def panel_of(state: ViewState, saving: Any = None) -> tuple[Panel, Gui, list[Change], list[str]]:
     gui, told, acts = Gui(), [], []
     made: Any = gui  # a stand-in
     made.main_panel = MagicMock()
     panel = Panel(
-        made,
-        {1: "a", 2: "b", 3: "c"},
-        told.append,
-        acts.append,
-        narrow=True,
-        own=MagicMock(),
-        use_hint=lambda: None,
-    )
+        made, {1: "a", 2: "b", 3: "c"}, told.append, acts.append, narrow=True,
+        own=MagicMock(), use_hint=lambda: None, saving=saving or MagicMock(),
+    )  # fmt: skip
     panel.show(state)
     return panel, gui, told, acts
 
@@ -185,3 +181,85 @@ def test_pins_are_listed_with_their_distances_and_an_empty_list_says_what_to_do(
 def test_a_hidden_distance_is_not_in_the_first_words():
     assert "30\u202fcm" in figures.heading(1.2, 0.3, 68)
     assert "30\u202fcm" not in figures.heading(1.2, None, 68)
+
+
+class Saving:
+    """Writes down what is ordered."""
+
+    def __init__(self) -> None:
+        self.ordered: list[Any] = []
+
+    def save(self, kind: str, **options: Any) -> None:
+        self.ordered.append((kind, options))
+
+    def stop(self) -> None:
+        self.ordered.append("stop")
+
+    def open(self, name: str, data: bytes) -> None:
+        self.ordered.append((name, data))
+
+
+def test_the_export_tab_orders_what_its_boxes_say():
+    saving = Saving()
+    panel, gui, told, _ = panel_of(DEFAULT, saving)
+    at = gui.widgets
+    at["Size"].value, at["Transparent"].value, at["Words and numbers"].value = "4 x", True, False
+    at["Save the picture"].hears(True)
+    at["Face"].value = "True face"
+    at["Save as"].hears("GLB")
+    at["Save numbers"].hears("CSV")
+    at["Save the state"].hears(True)
+    at["What moves"].value = "Mode B"
+    at["Save it as"].hears("GIF")
+    at["Save it as"].hears("Page")
+    at["What moves"].value = "Assumed distance"
+    at["Save it as"].hears("WebP")
+    at["Stop"].hears(True)
+    assert saving.ordered == [
+        ("png", {"scale": 4, "transparent": True, "overlays": False}),
+        ("glb", {"face": "true"}),
+        ("csv", {}),
+        ("state", {}),
+        ("gif", {"what": "mode", "mode": 2}),
+        ("html", {"whats": ("mode",)}),
+        ("webp", {"what": "distance"}),
+        "stop",
+    ]
+    assert told == []  # an export changes nothing
+    panel.show(DEFAULT)
+
+
+def test_an_own_photograph_is_in_a_file_only_when_it_is_there_and_asked_for():
+    saving = Saving()
+    panel, gui, _, _ = panel_of(DEFAULT, saving)
+    own = gui.widgets["With my photograph"]
+    at = gui.widgets
+    at["Size"].value, at["Transparent"].value, at["Words and numbers"].value = "1 x", False, True
+    at["What moves"].value = "Assumed distance"
+    seen: list[bool] = []
+    for state, ticked in ((DEFAULT, True), (changed(DEFAULT, subject="photo"), False)):
+        panel.show(state)
+        own.value = ticked
+        at["Save the picture"].hears(True)
+        at["Save it as"].hears("WebP")
+        seen.append(getattr(own, "visible", True))
+    assert seen == [False, True]
+    assert all("own_photo" not in options for _, options in saving.ordered)
+    own.value = True
+    at["Save the picture"].hears(True)
+    at["Save it as"].hears("Page")
+    assert [options["own_photo"] for _, options in saving.ordered[-2:]] == [True, True]
+
+
+def test_how_far_a_file_is_stands_in_the_tab_and_can_be_stopped_only_meanwhile():
+    panel, *_ = panel_of(DEFAULT)
+    tab: Any = panel.export
+    tab.show(Shown("Drawing: 2 of <4>.", 0.25, busy=True))
+    assert "Drawing: 2 of &lt;4&gt;." in tab.words.content
+    assert tab.bar.value == 25.0
+    assert tab.bar.visible
+    assert tab.stop.visible
+    tab.show(Shown())
+    assert tab.words.content == ""
+    assert not tab.bar.visible
+    assert not tab.stop.visible

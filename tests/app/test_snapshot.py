@@ -9,6 +9,7 @@ import pytest
 
 from faceambig.render.overlay import encode_png
 from faceambig_app import ViewState, snapshot
+from faceambig_app.pipeline import model
 from faceambig_app.state import changed
 from scenes import GOLDEN, need_renderer
 
@@ -76,6 +77,9 @@ def test_the_picture_carries_its_state(tmp_path):
     snapshot(ViewState(subject=4, distance=0.6), tmp_path / "a.png", width=640, height=400)
     with PngImageFile(tmp_path / "a.png") as picture:
         assert picture.text["ViewState"] == '{"subject":4,"distance":0.6}'
+        assert picture.text["Software"].startswith("faceambig 0.")
+        assert picture.text["Model"].startswith("embedded")
+        assert picture.text["Licence"] == model("embedded").licence
 
 
 LOOKS = {
@@ -92,12 +96,12 @@ LOOKS = {
 
 def test_every_look_is_to_be_seen_in_its_part_of_the_picture():
     """Photograph, heads and numbers are columns; what a look draws changes its own and leaves the others."""
-    size = {"width": 720, "height": 450}
-    plain = snapshot(ViewState(), **size)[:, :, :3].astype(int)
+    width, height = 720, 450
+    plain = snapshot(ViewState(), width=width, height=height)[:, :, :3].astype(int)
     photograph, heads, numbers = slice(0, 185), slice(190, 530), slice(535, 720)
     changes = {}
     for name, look in LOOKS.items():
-        seen = snapshot(ViewState(**look), **size)[:, :, :3].astype(int)
+        seen = snapshot(ViewState(**look), width=width, height=height)[:, :, :3].astype(int)
         moved = np.abs(seen - plain).max(axis=2) > CLEARLY
         changes[name] = tuple(bool(moved[:, part].any()) for part in (photograph, heads, numbers))
     assert changes == {

@@ -90,6 +90,7 @@ def test_every_word_of_the_file_is_asked_for(recorded):
         narrow=False,
         own=MagicMock(),
         use_hint=lambda: None,
+        saving=MagicMock(),
     )
     shown.spoken(DEFAULT)
     exact = {ask.replace("\\", "") for _, ask in ASKED if "[" not in ask}

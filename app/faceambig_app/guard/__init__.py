@@ -14,6 +14,7 @@ import viser
 
 from .data import add_colours, data_html
 from .door import Door, Hooks, ServeError, log_line
+from .downloads import send_file
 from .hooks import install, opened
 from .messages import MAX_BAD, MAX_MESSAGE
 from .page import PATCHES, make_page, our_script
@@ -24,7 +25,7 @@ from .values import TYPING, restate
 
 __all__ = [
     "MAX_BAD", "MAX_MESSAGE", "MAX_REPORT", "MAX_UPLOAD", "PATCHES", "TYPING", "Hooks", "ServeError", "add_colours",
-    "add_reports", "add_upload", "data_html", "log_line", "restate", "start",
+    "add_reports", "add_upload", "data_html", "log_line", "restate", "send_file", "start",
 ]  # fmt: skip
 
 

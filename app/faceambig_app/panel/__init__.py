@@ -14,7 +14,7 @@ import viser
 from ..guard import data_html
 from ..state import ViewState
 from ..text import distance_text, say
-from . import compare, data, explore, flex, view
+from . import compare, data, explore, export, flex, view
 from .widgets import Change as Change
 from .widgets import Tell, Widgets
 
@@ -57,6 +57,7 @@ class Panel:
         narrow: bool,
         own: data.Does,
         use_hint: Callable[[], None],
+        saving: export.Does,
     ) -> None:
         self.widgets = w = Widgets(gui, tell, act)
         gui.set_panel_label(say("app.title"))
@@ -83,6 +84,8 @@ class Panel:
             pins = compare.build(w)
         with tabs.add_tab(say("panel.data")):
             self.own = data.build(w, own, use_hint)
+        with tabs.add_tab(say("panel.export")):
+            self.export = export.build(w, saving)
         spoken, told = gui.add_html(""), gui.add_html("")
         gui.main_panel.dock_right()
         gui.main_panel.set_width(SIDE_WIDTH)
