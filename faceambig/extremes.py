@@ -32,8 +32,8 @@ from .arrays import Array, number, read_only, shown, whole
 from .camera import Camera, depths, jacobian, project
 from .fitting import Fit
 from .fitting.boxqp import solve_box_qp
-from .fitting.solve import POSE, Problem, solve
-from .fitting.task import landmark_rows
+from .fitting.solve import POSE
+from .fitting.task import best_camera, landmark_rows
 from .flex import evaluation_modes, gram
 from .metrics import HUMAN_TOLERANCE_PERCENT, mean_gap_percent, surface_difference
 from .model import FaceModel
@@ -197,14 +197,7 @@ class _Photo:
         """The camera that sees a face best, from `camera` on."""
         if not self.free:
             return camera
-        v = self.landmarks(alpha)
-        if depths(camera, v).min() <= 0:
-            return camera
-        L, still = len(v), np.zeros(1)  # the solver wants a mode: one that moves nothing
-        rigid = Problem(
-            self.points, np.ones(L), v, np.zeros((3, L)), np.zeros((L, 3, 1)), 1.0, np.inf
-        )
-        return solve(rigid, camera, still, tolerance=1e-10).camera
+        return best_camera(self.points, self.landmarks(alpha), camera)
 
     def rms(self, alpha: Array, camera: Camera) -> float:
         """Rms distance of the projected landmarks, 1 is the tolerance; inf with one behind the camera."""

@@ -115,7 +115,7 @@ _ROWS = (
     Action("undo", "Z", "cmd/ctrl"),
     Action("redo", "Z", "cmd/ctrl+shift"),
     Action("reset"),
-    Action("unbend", change=_set(flex=(), draw=None)),
+    Action("unbend", change=_set(flex=(), draw=None, extreme=None)),
     Action("new_noise", change=_new_noise),
     Action("copy_link"),
     Action("copy_command"),

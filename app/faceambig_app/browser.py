@@ -12,16 +12,20 @@ from typing import cast
 
 import viser
 
-from . import figures, guard, history, photograph, plots
+from faceambig.scene import Scene
+
+from . import figures, guard, history, photograph, pipeline, plots
 from .actions import ACTIONS
 from .fields import FIELDS
+from .fits import model
 from .forms import command
 from .glide import Glide
 from .link import query
 from .notices import from_query
 from .panel import Change, Panel
-from .pipeline import Frame, curve_key, curve_of, frame, model, photo_jpeg
+from .pipeline import Frame, curve_key, flex_of, frame, plots_of
 from .room import Dispatcher, Room
+from .scenes import photo_jpeg
 from .script import Copied, Dark, Hello, Key, Report, Script, Theme, is_dark
 from .stage import Stage
 from .state import DEFAULT, ViewState, changed
@@ -48,6 +52,7 @@ class Browser:
         self._still = False  # whether this person wants no motion
         self._dark = False  # whether this person's system is dark
         self._curves_of: object = None  # what the plots show
+        self._rested: ViewState | None = None  # the state drawn in full last
         self._picture_of: object = None  # what the photograph shows: (target, draft)
         self.stage = Stage(client, self._orbited)
         self._dress()
@@ -203,21 +208,33 @@ class Browser:
 
     def draw(self, state: ViewState, draft: bool) -> None:
         """Compute a state and send it. Computing is done before the lock of atomic(), never inside."""
-        shown = frame(state, with_curves=not draft)
-        html = self._contents(state, shown, draft)
+        if draft:
+            shown = pipeline.draft(state, self._rested)
+        else:
+            shown = frame(state, with_curves=False)
+        self._send(self._contents(state, shown, draft), shown.scene, draft)
+        if draft:
+            return
+        self._rested = state
+        # Heads first: a new target's curves cost a sweep and a posterior
+        plot = plots.plots(plots_of(state), shown.scene.numbers, hide=state.hide)
+        self._curves_of = curve_key(state.target, state.fitting)
+        self._send([(self.panel.places.plots, plot)])
+        self._loop.call_soon_threadsafe(self._settle, state)
+
+    def _send(self, html: Contents, scene: Scene | None = None, draft: bool = False) -> None:
         if self.room.left:  # while this was computed
             return
         with self._client.atomic():
-            self.stage.show(shown.scene, draft)
+            if scene is not None:
+                self.stage.show(scene, draft)
             for handle, content in html:
                 handle.content = content
         self._client.flush()
-        if not draft:
-            self._loop.call_soon_threadsafe(self._settle, state)
 
     def _contents(self, state: ViewState, shown: Frame, draft: bool) -> Contents:
         """What the elements of the panel show of a frame."""
-        at, scene, hide, key = self.panel.places, shown.scene, state.hide, curve_key(state)
+        at, scene, hide = self.panel.places, shown.scene, state.hide
         cards = figures.cards(scene.numbers, hide=hide)
         marks = photograph.photo_marks(scene.photo, crosses=False, hover=not draft)
         html: Contents = [(at.crosses, photograph.photo_crosses(scene.photo))]
@@ -225,9 +242,10 @@ class Browser:
             html.append((at.marks, figures.side_by_side(marks, cards)))
         else:
             html += [(at.cards, cards), (at.marks, marks)]
-        if not draft or key == self._curves_of:  # a new target's curves cost a sweep: only at rest
-            html.append((at.plots, plots.plots(curve_of(state), scene.numbers, hide=hide)))
-            self._curves_of = key
+        if (
+            curve_key(state.target, state.fitting) == self._curves_of
+        ):  # else at rest, when all else is shown
+            html.append((at.plots, plots.plots(plots_of(state), scene.numbers, hide=hide)))
         if (state.target, draft) != self._picture_of and not (
             draft and self._picture_of == (state.target, False)
         ):
@@ -239,15 +257,14 @@ class Browser:
 
     def _at_rest(self, state: ViewState, shown: Frame) -> Contents:
         at, scene = self.panel.places, shown.scene
-        low, high = shown.flex_reach
-        points = len(scene.photo.observed)
+        first = flex_of(state)[0]
         spoken = figures.spoken(scene.numbers, hide=state.hide) + figures.heads_words(scene)
         return [
             (at.legend, "" if scene.legend is None else figures.legend(scene.legend)),
             (at.spoken, spoken),
             (at.data, self.panel.spoken(state) + text_size(state.text)),
-            (at.flex, figures.flex_words(shown.flex_words, low, high)),
-            (at.heading, figures.heading(scene.numbers.distance, state.actual, points)),
+            (at.flex, figures.flex_words(first.words, first.low, first.high)),
+            (at.heading, figures.heading(scene.numbers.distance, state.actual, shown.points)),
         ]
 
     def _settle(self, drawn: ViewState) -> None:

@@ -86,7 +86,15 @@ _ROWS = (
         "flex_at", "choice", "bend", "landmarks that the flexibility modes keep",
         choices=("reprojection", "dlt"),
     ),
-    Field("draw", "index", "bend", "which face drawn from the posterior", 0, 9999),
+    Field("draw", "index", "bend", "which face drawn from the posterior, in place of the fit", 0, 9999),
+    Field(
+        "extreme", "index", "bend",
+        "which of the two faces farthest apart behind the same points, in place of the fit", 1, 2,
+    ),
+    Field(
+        "flex_from", "whole", "page", f"first of the {MODES} flexibility modes that have sliders",
+        1, LAST_MODE - MODES + 1, view=True,
+    ),
     Field(
         "show", "choice", "look",
         "how true and fitted face are compared; row: fits at 30 60 120 240 cm",

@@ -19,7 +19,7 @@ from faceambig.arrays import Array
 from faceambig.io import LandmarkFile
 from faceambig.io.pictures import Picture, is_picture, picture_beside, read_picture
 
-from .pipeline import write_pairs
+from .files import write_pairs
 
 NAMES = ("overlay.png", "face.obj", "face.ply", "face.glb", "fit.json")
 HINTED = (0.2, 50.0)  # metres: distances that a hint may name

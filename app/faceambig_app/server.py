@@ -17,7 +17,8 @@ import viser
 from . import guard
 from .browser import Browser
 from .fields import FIELDS
-from .pipeline import frame, model
+from .fits import model
+from .pipeline import frame
 from .room import Dispatcher
 from .stage import FAR, FIRST_FOV, FIRST_POSITION, NEAR
 from .state import DEFAULT

@@ -50,6 +50,7 @@ class Bend(NamedTuple):
     flex: tuple[tuple[int, float], ...]
     flex_at: str
     draw: int | None
+    extreme: int | None  # goes before a draw, and both before flex: each stands for the whole face
 
 
 class Look(NamedTuple):
@@ -95,6 +96,8 @@ class ViewState(
     flex: tuple[tuple[int, float], ...] = ()  # (mode from 1, mm of mean surface change)
     flex_at: str = "reprojection"
     draw: int | None = None
+    extreme: int | None = None
+    flex_from: int = 1  # the first of the modes that have sliders
     show: str = "both"
     surface: str = "skin"
     view: str = "three_quarter"

@@ -292,7 +292,7 @@ def _cameras(face: Face, look: Look) -> tuple[tuple[str, Station], ...]:
 
 def _lines(subject: Subject, face: Face, look: Look, picture: Photo) -> Iterable[Lines]:
     """Rays cut to what is shown: from a drawn camera on, else from where the picture ends; and the cameras."""
-    at = face.fit.observation.vertices(subject.model)
+    at = face.observation.vertices(subject.model)
     for name, place in _cameras(face, look):
         vertices, tone = (subject.vertices, "seen") if name == "true" else (face.vertices, "d_l")
         if "rays" in look.overlays:

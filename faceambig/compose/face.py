@@ -18,7 +18,8 @@ from ..camera import Camera, project
 from ..fitting import Fit
 from ..flex import FlexibilityModes
 from ..metrics import HUMAN_TOLERANCE_PERCENT, mean_gap_percent, surface_difference
-from ..model import Subject
+from ..model import FaceModel, Subject
+from ..observation import Observation
 from ..posterior import DistanceDensity
 from ..scene import Curves, Numbers
 from ..sweep import Sweep
@@ -31,6 +32,9 @@ class Face:
     """A fitted face, bent or not, measured against the true one. N vertices, L landmarks."""
 
     fit: Fit
+    observation: (
+        Observation  # the points that pictures show: those fitted, or others of the same photograph
+    )
     camera: Camera  # that sees the face so: the fit's own, or a draw's
     vertices: Array  # (N, 3) metres, laid rigidly on the true face
     projected: Array  # (L, 2) pixels
@@ -57,6 +61,7 @@ def measure(
     flex_words: str = "",
     flex_mm: float = 0.0,
     flex: Sequence[tuple[str, float]] = (),
+    shown: Observation | None = None,
 ) -> Face:
     """The face of a fit, its coefficients changed by `bend` (S,), against the true face.
 
@@ -66,6 +71,7 @@ def measure(
     camera: that sees it so; None: the fit's.
     limit: the largest |alpha| of a face that still counts as plausible.
     flex_words, flex_mm: what bends it. flex: the same of several modes, (words, mm) each; `bent` gives their sum.
+    shown: the points that pictures show, where thousands were fitted; None: all. d_L is of those fitted.
     """
     model, observation = fit.model, fit.observation
     own_alpha = fit.alpha if alpha is None else checked("alpha", alpha, (None,))
@@ -74,13 +80,16 @@ def measure(
     seen_by = fit.camera if camera is None else camera
     own = model.vertices(own_alpha)
     surface = surface_difference(own, subject.vertices, model.evaluation)
-    projected = project(seen_by, own[observation.vertices(model)]) + observation.centre
+    projected = _projected(seen_by, own, fit.model, observation)
     gaps = (observation.points - projected)[observation.visible]
+    if shown is not None:
+        observation, projected = shown, _projected(seen_by, own, fit.model, shown)
     moved = tuple((words, float(mm)) for words, mm in flex if mm != 0)
     if moved and not flex_words:
         flex_words, flex_mm = moved[0]
     return Face(
         fit=fit,
+        observation=observation,
         camera=seen_by,
         own_vertices=own,
         vertices=own @ surface.rotation.T + surface.translation,
@@ -95,6 +104,13 @@ def measure(
         flex_mm=flex_mm,
         flex=moved,
     )
+
+
+def _projected(
+    camera: Camera, vertices: Array, model: FaceModel, observation: Observation
+) -> Array:
+    """(L, 2) pixels: an observation's points of a surface."""
+    return project(camera, vertices[observation.vertices(model)]) + observation.centre
 
 
 def bent(modes: FlexibilityModes, mm: Sequence[float]) -> Array:

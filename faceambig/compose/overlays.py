@@ -52,7 +52,7 @@ def station(
 
 def marks(subject: Subject, face: Face, *, names: bool) -> tuple[Marks, Marks]:
     """The landmarks given in the photograph, on the true head and on the fitted one, a little above the surface."""
-    model, observation = subject.model, face.fit.observation
+    model, observation = subject.model, face.observation
     seen = np.isfinite(observation.points.sum(axis=1))
     at = observation.vertices(model)[seen]
     words: tuple[str, ...] = ()

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from ..arrays import Array, number, read_only, shown
-from ..camera import Camera, project
+from ..camera import Camera, depths, project
 from ..model import FaceModel, Scheme
 from ..observation import FLATTEST, MIN_POINTS, Observation, eye_distance
 from .als import solve_alternating
@@ -110,6 +110,21 @@ def solve_by(problem: Problem, camera: Camera, alpha: Array, options: FitOptions
     if options.method == "als":
         return solve_alternating(problem, camera, alpha, options)
     return solve(problem, camera, alpha, tolerance=options.tolerance, max_steps=options.max_steps)
+
+
+def best_camera(
+    points: Array, landmarks: Array, start: Camera, weights: Array | None = None
+) -> Camera:
+    """The camera at the distance of `start` that sees given landmarks (L, 3) of a face best.
+
+    points: (L, 2) pixels from the principal point. `start` itself where a landmark is behind it.
+    """
+    if depths(start, landmarks).min() <= 0:
+        return start
+    L, still = len(landmarks), np.zeros(1)  # the solver wants a mode: one that moves nothing
+    weights = np.ones(L) if weights is None else weights
+    rigid = Problem(points, weights, landmarks, np.zeros((3, L)), np.zeros((L, 3, 1)), 1.0, np.inf)
+    return solve(rigid, start, still, tolerance=1e-10).camera
 
 
 def kappa_of(camera: str, distance: float | None) -> float:

@@ -22,7 +22,8 @@ from faceambig import compose
 from faceambig.io.pictures import Picture, read_picture
 from faceambig.observation import portrait_camera
 from faceambig.render import fitted, painter
-from faceambig_app import photo, pipeline
+from faceambig_app import files as out_files
+from faceambig_app import photo
 from faceambig_app.photo import NAMES
 
 PHOTOS = Path(__file__).resolve().parents[3] / "shared" / "data" / "photos"
@@ -282,7 +283,7 @@ def test_a_folder_without_permission_is_refused_before_the_work(
 def test_files_are_written_together_or_not_at_all(tmp_path):
     files = {tmp_path / "a": b"1", tmp_path / "none" / "b": b"2"}
     with pytest.raises(ValueError, match=r"out: cannot write .*none"):
-        pipeline.write_all(files)
+        out_files.write_all(files)
     assert not list(tmp_path.iterdir())
 
 

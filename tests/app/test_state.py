@@ -86,12 +86,12 @@ def test_equal_states_are_one_key(state):
 PARTS = {
     "target": {"subject", "actual", "yaw", "pitch", "roll", "scheme", "noise", "seed", "model", "data"},
     "fitting": {"distance", "camera", "modes", "prior", "box"},
-    "bend": {"flex", "flex_at", "draw"},
+    "bend": {"flex", "flex_at", "draw", "extreme"},
     "look": {"show", "surface", "view", "orbit", "zoom", "overlays", "error_scale", "fade", "hide"},
-    "page": {"pins", "theme", "text"},
+    "page": {"pins", "theme", "text", "flex_from"},
 }  # fmt: skip
 OTHER = {
-    "model": "elsewhere.npz", "subject": "photo", "flex": ((2, 1.0),), "draw": 0, "orbit": (1.0, 2.0),
+    "model": "elsewhere.npz", "subject": "photo", "flex": ((2, 1.0),), "draw": 0, "extreme": 1, "orbit": (1.0, 2.0),
     "overlays": ("rays",), "hide": ("truth",), "pins": (DEFAULT,),
 }  # fmt: skip
 

@@ -172,15 +172,15 @@ def _synthetic(options: argparse.Namespace, pixels: bool) -> Start:
     }
     target = DEFAULT.target._replace(model=options.model or DEFAULT.model, **values)
 
-    from .. import pipeline
+    from .. import fits, scenes
 
-    taken = pipeline.photograph(target)
+    taken = fits.photograph(target)
     picture = None
     if pixels:
         from faceambig.io.pictures import Picture
         from faceambig.render.painter import paint_photo
 
-        painted = paint_photo(pipeline.picture(target), PAINTED)
+        painted = paint_photo(scenes.picture(target), PAINTED)
         picture = Picture(f"synthetic {taken.subject.name}", painted)
     noise = (
         "without noise" if not target.noise else f"noise of {target.noise:g} %, seed {target.seed}"

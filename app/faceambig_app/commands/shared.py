@@ -67,8 +67,8 @@ def written(
     inside: Iterable[tuple[str, bytes]] = (),
 ) -> list[str]:
     """Write all files, and those `inside` a folder by name, or none; what was written, in order."""
+    from ..files import write_all
     from ..photo import write_folder
-    from ..pipeline import write_all
 
     done = [str(path) for path in files]
     if folder is None:

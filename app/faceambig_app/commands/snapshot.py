@@ -49,7 +49,8 @@ def run(options: argparse.Namespace) -> int:
             raise ValueError(f"width, height: {side} is not within 64 to 8192 pixels")
     from pathlib import Path
 
-    from ..pipeline import snapshot, writable
+    from ..files import writable
+    from ..pipeline import snapshot
 
     writable(Path(options.out))  # before the work, not after it
     snapshot(state, options.out, width=options.width, height=options.height)

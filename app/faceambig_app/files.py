@@ -1,0 +1,42 @@
+"""Output files: the whole of them or nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from contextlib import ExitStack
+from pathlib import Path
+
+from faceambig.io.files import replacing
+
+
+def writable(path: Path) -> None:
+    """ValueError if a file cannot be put at `path`: no such folder, or a folder itself."""
+    if not path.parent.is_dir():
+        raise ValueError(f"out: there is no folder {str(path.parent)!r}")
+    if path.is_dir():
+        raise ValueError(f"out: {str(path)!r} is a folder, not a file")
+
+
+def write(path: Path, data: bytes) -> None:
+    """The whole file or nothing: beside it first, then in its place. ValueError says why not."""
+    writable(path)
+    write_all({path: data})
+
+
+def write_all(files: Mapping[Path, bytes]) -> None:
+    """All files or none: each beside its place first, and only when all of them are there, in their places.
+
+    ValueError says why not; of a full disk nothing is left.
+    """
+    write_pairs(files.items())
+
+
+def write_pairs(files: Iterable[tuple[Path, bytes]]) -> None:
+    """As `write_all`; the files are taken one after the other, so that they need not be in memory together."""
+    path = None
+    try:
+        with ExitStack() as stack:
+            for path, data in files:
+                stack.enter_context(replacing(path)).write_bytes(data)
+    except OSError as error:
+        raise ValueError(f"out: cannot write {str(path)!r}: {error.strerror}") from error
