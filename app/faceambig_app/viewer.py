@@ -32,7 +32,7 @@ FIRST_POSITION, FIRST_FOV = (
     (0.0, 0.0, LENS),
     0.0257,
 )  # of a browser that has heard nothing yet; no view uses this angle
-ARRIVAL = 1.0  # seconds a browser may take to go where it is put
+ARRIVAL = 5.0  # seconds a browser may take to go where it is put; a busy one took more than 1 when it connected
 ORBIT_REST = 0.25  # seconds without a turn before the place is told
 SAME_TURN, SAME_ZOOM = 0.6, 0.01  # degrees and share that a rounded place may be off
 
@@ -204,8 +204,8 @@ class Viewer:
         back = self.sight.board[:, 2]
         half = LENS * np.tan(0.5 * self._client.camera.fov)
         place = (
-            round(float(np.degrees(np.arctan2(back[0], back[2]))), 1),
-            round(float(np.degrees(np.arcsin(np.clip(back[1], -1, 1)))), 1),
+            round(float(np.degrees(np.arctan2(back[0], back[2]))), 1) + 0.0,  # no minus zero
+            round(float(np.degrees(np.arcsin(np.clip(back[1], -1, 1)))), 1) + 0.0,
             round(float(ZOOM_1 * self._wider() / half), 2),
         )
         if not _same(self._view, place) and place not in self._told[-1:]:
