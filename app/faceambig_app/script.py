@@ -132,10 +132,17 @@ class Script:
 
     def copy(self, text: str) -> int:
         """Put a text on the clipboard; the number that `Copied` will name."""
+        return self._copy(text, link=False)
+
+    def copy_link(self, query: str) -> int:
+        """Put a link to this page with a query on the clipboard: the browser knows its own address, a server may not."""
+        return self._copy(query, link=True)
+
+    def _copy(self, text: str, link: bool) -> int:
         with self._lock:
             self._copies += 1
             n = self._copies
-        self._send("copy", {"text": text, "n": n})
+        self._send("copy", {"text": text, "n": n, "link": link})
         return n
 
     def blink(self, nodes: Sequence[str], seconds: float = 0.5) -> None:

@@ -11,7 +11,7 @@
 //   words      {lost, back, no_webgl, copy, close}: what this script itself says; the first ones come with the page
 //   report     {uuid}: the text control that takes reports; it is answered by "hello"
 //   address    {query}: what the address bar shows after "/?"; never a new entry of the history
-//   copy       {text, n}: to the clipboard, once for each n; answered by "copied"
+//   copy       {text, n, link}: to the clipboard, once for each n, answered by "copied"; a link: text is its query
 //   blink      {nodes, seconds}: one of these nodes is drawn at a time, `seconds` each; no nodes end it
 //   theme      {theme: auto | light | dark, text: 1 to 2}: kept in localStorage
 //   keys       {on}: whether keys without Ctrl, Alt or Meta are shortcuts

@@ -74,7 +74,12 @@ style.textContent = `
   :root { font-size: calc(100% * var(--fa-scale, 1)); }
   .mantine-Slider-thumb { width: 24px !important; height: 24px !important; border-radius: 50% !important; }
   .mantine-Slider-root { padding-block: 8px !important; }
-  .mantine-Button-root, .mantine-ActionIcon-root { min-height: 24px !important; min-width: 24px !important; }
+  .mantine-Button-root { min-height: 30px !important; height: auto !important; }
+  .mantine-ActionIcon-root, [role=button][aria-label$="panel area"] { min-height: 24px !important; min-width: 24px !important; }
+  .mantine-NumberInput-input { min-height: 24px !important; }
+  .mantine-NumberInput-controls { flex-direction: row-reverse !important; width: 52px !important; height: 100% !important; }
+  .mantine-NumberInput-control { width: 26px !important; height: 100% !important; border: 0 !important; }
+  .mantine-NumberInput-section:has(.mantine-NumberInput-controls) { width: 52px !important; }
   .mantine-Checkbox-inner, .mantine-Checkbox-input { width: 24px !important; height: 24px !important; }
   .mantine-Paper-root[role=button] { min-height: 24px; }
   button[aria-pressed="true"] { background: var(--mantine-primary-color-light); font-weight: 700; }
