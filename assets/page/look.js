@@ -87,7 +87,7 @@ style.textContent = `
   [data-mantine-color-scheme=dark] :focus-visible { outline-color: #7ab7ff !important; }
   [data-fa-copy], [data-fa-place="1"] { cursor: pointer; }
   [data-fa-point] { cursor: grab; }
-  [data-fa-point], [data-fa-place="1"] { touch-action: none; }
+  [data-fa-place="1"] { touch-action: none; }
   .fa-status { position: fixed; top: 8px; left: 50%; transform: translateX(-50%); z-index: 1000; max-width: 90vw;
     padding: 6px 14px; border-radius: 8px; background: #1d2733; color: #fff; font: 14px/1.45 system-ui, sans-serif;
     pointer-events: none; }

@@ -119,10 +119,10 @@ def test_a_drag_is_one_step_and_the_address_follows_without_history(me):
 
 
 def test_keys_do_what_the_table_of_actions_says(me):
-    expected = dict(
-        J="nearer", K="farther", F="front", T="three_quarter", P="side", U="top", C="camera", B="blink",
-        O="overlay", H="difference", L="points", R="rays", M="pin", X="reset_view",
-    )  # fmt: skip
+    expected = {
+        "J": "nearer", "K": "farther", "F": "front", "T": "three_quarter", "P": "side", "U": "top", "C": "camera",
+        "B": "blink", "O": "overlay", "H": "difference", "L": "points", "R": "rays", "M": "pin", "X": "reset_view",
+    }  # fmt: skip
     assert {a.key: name for name, a in ACTIONS.items() if a.change and a.key} == expected
     for key, name in expected.items():
         change = ACTIONS[name].change

@@ -430,16 +430,12 @@ def test_a_magnifier_under_a_finger(server: Tiny, visit: Callable[..., Page]) ->
         touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
 
     loupe = page.locator(".fa-loupe")
-    x = y = 0.0
-    for _ in range(20):  # the panel may still be on its way to its place
-        x, y = middle(page)
-        finger("touchStart", x, y)
-        page.wait_for_timeout(100)
-        if loupe.count():
-            break
-        finger("touchEnd")
+    x, y = middle(page)
+    finger("touchStart", x, y)
+    loupe.wait_for(timeout=PATIENCE)
     finger("touchMove", x + 20, y + 30)
     assert until(lambda: server.of(script.Point))
+    assert not server.of(script.Point)[-1].done  # the browser has not taken the finger to scroll
     box = loupe.bounding_box()
     assert box is not None
     assert not (
