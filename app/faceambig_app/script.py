@@ -187,9 +187,8 @@ class Script:
                 log_line(str(error))
             self._warned = True
             return
-        if isinstance(
-            report, Key
-        ):  # the page has ended it: else the next data would begin it again
+        # The page has ended it, else the next data would begin it again; never begun here, it may be another's
+        if isinstance(report, Key) and "blink" in self._data:
             self.blink(())
         self._heard(report)
 

@@ -101,8 +101,7 @@ class Viewer:
         camera = self._client.camera
         self._size = (camera.image_width, camera.image_height)
         self._looked_at = time.monotonic()
-        if self._timer is not None:
-            self._timer.cancel()
+        self._keep_quiet()
         if isinstance(view, Lens):
             self._look_through(view)
             return
@@ -177,11 +176,11 @@ class Viewer:
             return
         with self._client.atomic():
             self._see(_board(camera.wxyz))
-        now = time.monotonic()
         if self._aimed(camera):
             self._looked_at = -np.inf
-        elif now > self._looked_at + ARRIVAL:
-            self._tell_at_rest()
+            self._keep_quiet()
+        else:  # a hand; or on its way, and then it arrives before that is told
+            self._tell_after(max(ORBIT_REST, self._looked_at + ARRIVAL - time.monotonic()))
 
     def _aimed(self, camera: viser.CameraHandle) -> bool:
         position, fov = self._aim
@@ -190,12 +189,14 @@ class Viewer:
             and abs(camera.fov / fov - 1) < 1e-3
         )
 
-    def _tell_at_rest(self) -> None:
-        if self._orbited is None:
-            return
+    def _tell_after(self, seconds: float) -> None:
+        self._keep_quiet()
+        if self._orbited is not None:
+            self._timer = asyncio.get_running_loop().call_later(seconds, self._tell)
+
+    def _keep_quiet(self) -> None:
         if self._timer is not None:
             self._timer.cancel()
-        self._timer = asyncio.get_running_loop().call_later(ORBIT_REST, self._tell)
 
     def _tell(self) -> None:
         """Say where a hand has turned the viewer to; the place of the view itself is no news."""

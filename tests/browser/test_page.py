@@ -8,15 +8,15 @@ import re
 import numpy as np
 import pytest
 
-from faceambig_app import ViewState, browser, pipeline
+from faceambig_app import ViewState, browser, faces, fits
 from visitor import PATIENCE, SEEN
 
 pytestmark = pytest.mark.browser
 
 
 def test_the_first_frame_teaches(me):
-    assert me.n_vertices("/true/head") == pipeline.model("embedded").n_vertices
-    assert me.n_vertices("/fit/head") == pipeline.model("embedded").n_vertices
+    assert me.n_vertices("/true/head") == fits.model("embedded").n_vertices
+    assert me.n_vertices("/fit/head") == fits.model("embedded").n_vertices
     assert np.abs(me.mesh("/true/head") - me.mesh("/fit/head")).max() > 1e-3  # another face
     d_l, d_s = me.numbers()
     assert d_l < 1.5
@@ -45,7 +45,7 @@ def test_arrow_keys_move_the_slider_and_the_face_but_not_the_camera(me):
 
 def test_the_cards_tell_the_numbers_of_the_person_that_was_chosen(me):
     for number in (2, 10):
-        name = pipeline.model("embedded").subjects[number - 1].name
+        name = fits.model("embedded").subjects[number - 1].name
         me.open("Person in the photo")
         me.tab.get_by_label("Person", exact=True).click()
         me.tab.get_by_role("option", name=name, exact=True).click()
@@ -54,7 +54,7 @@ def test_the_cards_tell_the_numbers_of_the_person_that_was_chosen(me):
         me.until(lambda: me.state.distance == 2.4, "240 did not arrive")
         me.rest()
         state = ViewState(subject=number, distance=2.4)
-        face = pipeline.face(state.target, state.fitting, state.bend)
+        face = faces.face(state.target, state.fitting, state.bend)
         want = np.array([face.d_l_percent, face.d_s_mm])
         assert np.abs(me.numbers() - want).max() < 0.06  # as many digits as the cards have
 
@@ -204,7 +204,7 @@ def test_view_buttons_say_which_is_on_and_turn_the_heads(me):
 def test_through_the_camera_the_eyes_keep_their_distance(me):
     me.tab.get_by_role("button", name="Through camera").click()
     me.until(lambda: me.state.view == "camera", "the button was not heard")
-    corners = pipeline.model("embedded").scheme("ibug68").vertices[[36, 39, 42, 45]].tolist()
+    corners = fits.model("embedded").scheme("ibug68").vertices[[36, 39, 42, 45]].tolist()
     gaps = []
     for centimetres in (30, 240):
         me.type_distance(str(centimetres))
