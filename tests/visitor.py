@@ -143,6 +143,7 @@ class Visitor:
 
     def drag(self, slider: Any, to: float) -> None:
         """A slider's thumb by the mouse to a share of its track."""
+        slider.scroll_into_view_if_needed()
         track = slider.evaluate(
             "e => { const b = e.closest('.mantine-Slider-trackContainer, .mantine-Slider-root')"
             ".querySelector('.mantine-Slider-track').getBoundingClientRect(); return [b.x, b.width] }"

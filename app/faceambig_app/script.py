@@ -135,7 +135,7 @@ class Script:
         return self._copy(text, link=False)
 
     def copy_link(self, query: str) -> int:
-        """Put a link to this page with a query on the clipboard: the browser knows its own address, a server may not."""
+        """Put a link to this page on the clipboard; the browser knows its own address, a server may not."""
         return self._copy(query, link=True)
 
     def _copy(self, text: str, link: bool) -> int:

@@ -151,8 +151,9 @@ class Viewer:
     def _wider(self) -> float:
         """How many times more must be seen on this canvas for the outermost heads to be whole at zoom 1."""
         camera = self._client.camera
+        high = 0.5 / PHONE_HEADS_AT if self.phone else 1.0  # the sheet leaves the upper part
         return max(
-            1.0, self._half_width / ZOOM_1 * camera.image_height / max(1, camera.image_width)
+            high, self._half_width / ZOOM_1 * camera.image_height / max(1, camera.image_width)
         )
 
     def _see(self, board: NDArray[np.float64]) -> None:

@@ -78,7 +78,8 @@ style.textContent = `
   .mantine-ActionIcon-root, [role=button][aria-label$="panel area"] { min-height: 24px !important; min-width: 24px !important; }
   .mantine-NumberInput-input { min-height: 24px !important; }
   .mantine-NumberInput-controls { flex-direction: row-reverse !important; width: 52px !important; height: 100% !important; }
-  .mantine-NumberInput-control { width: 26px !important; height: 100% !important; border: 0 !important; }
+  .mantine-NumberInput-control { flex: 0 0 26px !important; max-width: none !important; height: 100% !important;
+    border: 0 !important; }
   .mantine-NumberInput-section:has(.mantine-NumberInput-controls) { width: 52px !important; }
   .mantine-Checkbox-inner, .mantine-Checkbox-input { width: 24px !important; height: 24px !important; }
   .mantine-Paper-root[role=button] { min-height: 24px; }
