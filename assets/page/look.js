@@ -77,7 +77,9 @@ style.textContent = `
   .mantine-Button-root { min-height: 30px !important; height: auto !important; }
   .mantine-ActionIcon-root, [role=button][aria-label$="panel area"] { min-height: 24px !important; min-width: 24px !important; }
   .mantine-NumberInput-input { min-height: 24px !important; }
-  .mantine-NumberInput-controls { flex-direction: row-reverse !important; width: 52px !important; height: 100% !important; }
+  .mantine-NumberInput-controls { flex-direction: row-reverse !important; width: 52px !important; max-width: none !important;
+    height: 100% !important; }
+  .mantine-Input-wrapper:has(.mantine-NumberInput-controls) input { padding-inline-end: 56px !important; }
   .mantine-NumberInput-control { flex: 0 0 26px !important; max-width: none !important; height: 100% !important;
     border: 0 !important; }
   .mantine-NumberInput-section:has(.mantine-NumberInput-controls) { width: 52px !important; }
