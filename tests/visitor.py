@@ -156,7 +156,7 @@ class Visitor:
         self.tab.mouse.move(end, y, steps=10)
         self.tab.mouse.up()
 
-    def canvas(self) -> dict[str, float]:
+    def canvas(self) -> Any:
         return self.tab.locator("canvas[data-engine]").bounding_box()
 
 

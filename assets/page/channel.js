@@ -17,6 +17,7 @@
 //   keys       {on}: whether keys without Ctrl, Alt or Meta are shortcuts
 // In what a panel shows:
 //   data-fa-copy="TEXT"                   a click, Enter or Space copies the text
+//   data-fa-spoken                        its text is said to a screen reader, SILENCE after it changed last
 //   data-fa-photo="WIDTHxHEIGHT"          an element whose box shows a photograph of so many pixels
 //   data-fa-view="X,Y,WIDTH,HEIGHT"       on it: the part in the box, in pixels of the photograph; else all of it
 //   data-fa-place="1"                     on it: a click places a point

@@ -106,7 +106,7 @@ def test_nothing_is_cut_off_and_a_finger_has_room(visit, tmp_path, axe, name, wi
 
 def assert_two_heads(me: Visitor, picture: np.ndarray, sheet: bool) -> None:
     """Skin, redder than blue by far, on both halves of what is seen of the scene."""
-    canvas, scale = me.canvas(), picture.shape[1] / me.tab.viewport_size["width"]
+    canvas, scale = me.canvas(), picture.shape[1] / me.tab.evaluate("() => innerWidth")
     x0, x1 = (round(scale * x) for x in (canvas["x"], canvas["x"] + canvas["width"]))
     scene = picture[: round((0.38 if sheet else 1) * len(picture)), x0:x1].astype(int)
     skin = scene[:, :, 0] > scene[:, :, 2] + 25

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from faceambig_app import cli, forms, history, server
+from faceambig_app import cli, forms, history, room, server
 from faceambig_app.actions import ACTIONS
 from faceambig_app.glide import STILLS
 from faceambig_app.link import query, to_digits
@@ -209,7 +209,7 @@ def test_link_and_command_are_copied_and_draw_what_is_seen(me, tmp_path):
     with contextlib.redirect_stdout(io.StringIO()):
         assert cli.main([*command[1:], "--width", "320"]) == 0
     with Image.open(out) as drawn:
-        assert to_digits(forms.from_json(str(drawn.text["ViewState"]))) == to_digits(me.state)
+        assert to_digits(forms.from_json(str(drawn.info["ViewState"]))) == to_digits(me.state)
 
 
 # ---------------------------------------------------------------- the connection
@@ -295,9 +295,10 @@ def glide_and_blink_stand_still(me: Visitor) -> None:
 # ---------------------------------------------------------------- what is said
 
 
-def test_what_a_screen_reader_says_changes_once_a_rest(me):
+def test_what_a_screen_reader_says_changes_once_a_rest(me, monkeypatch):
+    monkeypatch.setattr(room, "REST", 4.0)  # where others compute, a hand stops for longer
     me.tab.evaluate(
-        """() => { window.said = []; const words = () => [...document.querySelectorAll('[aria-live=polite]')]
+        """() => { window.said = []; const words = () => [...document.querySelectorAll('.fa-spoken[aria-live=polite]')]
           .map(e => e.textContent).join('');
         let last = words();
         window.listening = new MutationObserver(() => { const now = words();
