@@ -76,7 +76,8 @@ label[for]{color:var(--fa-dim)!important;letter-spacing:0!important;font-size:ca
 --button-bd:1px solid var(--fa-dl)!important}
 @media(max-width:576px){.mantine-Paper-root[style*="20em"]{width:100%!important;left:0!important;right:0!important}
 .mantine-ScrollArea-content>div[style*="20em"]{width:100%!important}
-.fa{line-height:1.35}.fa h1{margin:.2em 0}.fa-card{padding:4px 8px}.fa-card span{font-size:calc(22px*var(--fa-scale,1))}}
+.fa{line-height:1.35}.fa h1{margin:.2em 0}.fa-card{padding:4px 8px}
+.fa-card span{font-size:calc(22px*var(--fa-scale,1))}}
 """
 
 STYLE = f"<style>{_TOKENS}{_TEXT}{_CARDS}{_PHOTO}{_PLOTS}{_VISER}</style>"
