@@ -78,6 +78,7 @@ class FaceModel:
     subjects: tuple[Subject, ...] = ()
     licence: str = ""
     source: str = ""
+    unit: str = ""  # of the file it was read from, in words; everything here is metres
     # (3,) metres, where the file's own origin lies in these coordinates
     file_origin: Array = field(default_factory=lambda: np.zeros(3))
     mean: Array = field(init=False)  # (N, 3) metres

@@ -93,6 +93,7 @@ def test_the_folder_above_and_the_environment_name_the_same_model(folder, monkey
     monkeypatch.setenv("FACEAMBIG_ICT", str(folder))
     assert np.array_equal(inside.mean, fio.load_model("ict").mean)
     monkeypatch.delenv("FACEAMBIG_ICT")
+    monkeypatch.setenv("FACEAMBIG_MODELS", str(folder / "none"))
     with pytest.raises(AssetError, match="ict: set FACEAMBIG_ICT"):
         fio.load_model("ict")
 

@@ -14,8 +14,10 @@ import pytest
 import faceambig as fa
 import faceambig.io as fio
 from faceambig.errors import AssetError
+from faceambig.io.between import points_between
 from faceambig.io.schemes import (
     check_scheme,
+    ibug68_sides,
     load_scheme,
     mediapipe_scheme,
     mesh_of_ibug68,
@@ -273,3 +275,38 @@ def test_the_documents_counts_and_lines_are_so(embedded, ict):
     assert (
         found["obs"].vertices(embedded).tolist() == embedded.scheme("mediapipe").vertices.tolist()
     )
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason="no tables in ../shared/data/landmark-maps")
+def test_the_numbers_on_other_models_are_those_of_the_tables():
+    folder = fio.asset_path("schemes")
+    for model, scheme, table, variant, count in (
+        ("sfm", "ibug68", "sfm_ibug", "default", 50),
+        ("bfm2009", "ibug68", "bfm2009_ibug", "anilbas", 68),
+        ("bfm2009", "eos", "bfm2009_ibug", "eos", 18),
+        ("bfm2017", "ibug68", "bfm2017_ibug", "model2017-1_bfm_nomouth", 26),
+    ):
+        wanted = {
+            row["point"]: int(row["vertex"])
+            for row in rows_of(SHARED / f"{table}.csv")
+            if (row["scheme"], row["variant"]) == ("ibug68", variant)
+        }
+        found = load_scheme(folder / f"{model}_{scheme}.csv", scheme)
+        assert {point: vertex for point, _, vertex in found.rows()} == wanted
+        assert len(wanted) == count
+    table = rows_of(SHARED / "flame_ibug68.csv")
+    points = points_between(folder / "flame_ibug68.csv")
+    assert points.points == tuple(row["point"] for row in table)
+    assert points.corners.tolist() == [[int(row[f"v{k}"]) for k in range(3)] for row in table]
+    assert points.weights.tolist() == [[float(row[f"b{k}"]) for k in range(3)] for row in table]
+
+
+def test_both_sides_of_the_maps_of_other_models_mirror_each_other():
+    sides = ibug68_sides()
+    assert [point for point, side in sides.items() if side == "mid"] == [
+        "9", "28", "29", "30", "31", "34", "52", "58", "63", "67",
+    ]  # fmt: skip
+    for file in ("sfm_ibug68", "bfm2009_ibug68", "bfm2009_eos", "bfm2017_ibug68", "flame_ibug68"):
+        scheme = load_scheme(fio.asset_path(f"schemes/{file}.csv"), "ibug68")
+        assert all(sides[point] == side for point, side, _ in scheme.rows()), file
+        assert len(set(scheme.vertices.tolist())) == len(scheme), file

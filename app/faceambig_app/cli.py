@@ -2,18 +2,20 @@
 
 The commands are in commands/, one module each.
 
-Exit status 0: good; 1: the fit did not converge; 2: bad input, one line on stderr, never a traceback.
+Exit status 0: good; 1: the fit did not converge; 2: bad input, one line on stderr, never a traceback;
+130: interrupted; 141: what reads the output has gone.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from .commands import COMMANDS
-from .commands.shared import BAD_INPUT
+from .commands.shared import BAD_INPUT, READER_GONE
 
 
 class Parser(argparse.ArgumentParser):
@@ -35,6 +37,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(arguments)
     try:
         return options.run(options)
+    except (
+        BrokenPipeError
+    ):  # the reader has enough, as `| head` has: no error, and nothing more is written
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return READER_GONE
     except (
         ValueError,
         OSError,

@@ -4,7 +4,7 @@ Letters: S modes, B control vertices, N surface vertices, F triangles, P subject
 
 ==========================  ============================  ==================================================
 format, version, name,      text, int                     "faceambig-model", 1
-licence, source
+licence, source, unit
 mean                        (B, 3)                        integers: micrometres; floats: metres
 modes, mode_step            (S, B, 3), (S,)               metres per standard deviation = modes * mode_step;
                                                           mode_step may be missing if modes are floats
@@ -26,8 +26,8 @@ _eyes_meaning
 
 A file may also have schemes beside it: `schemes/<name of the model>_<scheme>.csv`. Other keys are not read.
 
-Nothing is inflated before the zip directory and each array's header agree on a size, and all shapes with each other:
-195 kB of zip can hold 200 MB, and a header of 100 bytes can claim terabytes.
+Nothing is inflated before the zip directory and each array's header agree on a size (zipped.py), and all shapes with
+each other.
 """
 
 from __future__ import annotations
@@ -35,10 +35,8 @@ from __future__ import annotations
 import os
 import re
 import zipfile
-import zlib
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -49,12 +47,11 @@ from scipy import sparse
 from ..arrays import Array, IntArray
 from ..errors import AssetError
 from ..model import FaceModel, Scheme, Subject
-from .files import replacing
+from .files import MAX_BYTES, damage_named, replacing
 from .schemes import schemes_in
+from .zipped import Member, array, count, headers, names_in
 
 FORMAT, VERSION = "faceambig-model", 1
-# Of all arrays as float64; the largest public model, 53,490 vertices and 199 modes, needs 255 MB
-MAX_BYTES = 1 << 29
 MAX_SCHEMES = 50
 NO_REGION = 255
 MICROMETRE = 1e-6
@@ -66,6 +63,7 @@ MEMBERS: dict[str, tuple[str, tuple[str | int, ...]]] = {
     "name": ("U", ()),
     "licence": ("U", ()),
     "source": ("U", ()),
+    "unit": ("U", ()),
     "mean": ("if", ("B", 3)),
     "modes": ("if", ("S", "B", 3)),
     "mode_step": ("f", ("S",)),
@@ -96,31 +94,21 @@ SCHEME_MEMBERS: dict[str, tuple[str, tuple[str | int, ...]]] = {
     "eyes_meaning": ("U", ()),
 }
 REQUIRED = ("format", "version", "name", "mean", "modes", "faces")
-
-# What numpy.save writes for a plain array, and nothing else: no pickle, no records, no literal_eval.
-HEADER = re.compile(
-    rb"\{'descr': '([<>|](?:i[1248]|u[1248]|f[248]|b1|U\d{1,7}))', "
-    rb"'fortran_order': (True|False), 'shape': \(([\d, ]*)\), \}\s*"
-)
+KNOWN = {*MEMBERS, *(f"scheme{k}_{name}" for k in range(MAX_SCHEMES) for name in SCHEME_MEMBERS)}
 
 
 def is_npz_model(path: Path) -> bool:
     """Whether `path` is a zip with the arrays of a model; damage inside is for `read_npz` to name."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            return {"format.npy", "mean.npy", "modes.npy"} <= set(archive.namelist())
-    except (OSError, zipfile.BadZipFile, ValueError, NotImplementedError):
-        return False
+    return {"format", "mean", "modes"} <= names_in(path)
 
 
 def read_npz(path: Path) -> FaceModel:
     """The model of an .npz file at the origin it was stored with; AssetError, one line, if it is damaged."""
-    with _damage_named(path), zipfile.ZipFile(path) as archive:
-        members = _headers(archive)
+    with damage_named(path), zipfile.ZipFile(path) as archive:
+        members = headers(archive, KNOWN, REQUIRED)
         sizes = _agreed_sizes(members)
-        arrays = {name: _array(archive, member) for name, member in members.items()}
-        with np.errstate(over="ignore", invalid="ignore"):  # infinities are refused by name below
-            return _built(arrays, sizes, path)
+        arrays = {name: array(archive, member) for name, member in members.items()}
+        return _built(arrays, sizes, path)
 
 
 def save_model(model: FaceModel, path: str | os.PathLike[str]) -> None:
@@ -137,74 +125,7 @@ def save_model(model: FaceModel, path: str | os.PathLike[str]) -> None:
         np.savez(stream, **arrays)
 
 
-@dataclass(frozen=True, slots=True)
-class _Member:
-    """An array in the zip before it is read."""
-
-    name: str
-    dtype: np.dtype[Any]
-    shape: tuple[int, ...]
-    fortran: bool
-    offset: int  # bytes of its header
-
-
-@contextmanager
-def _damage_named(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except AssetError as error:
-        message = str(error)
-        raise error if path.name in message else AssetError(f"{path.name}: {message}") from error
-    except (
-        # all that zipfile, zlib and NumPy raise on bytes that are not what they say
-        ValueError, OSError, EOFError, RuntimeError, OverflowError, MemoryError, zipfile.BadZipFile, zlib.error,
-    ) as error:  # fmt: skip
-        reason = (str(error).splitlines() or [type(error).__name__])[0]
-        raise AssetError(f"{path.name}: damaged model file ({reason:.100})") from error
-
-
-def _headers(archive: zipfile.ZipFile) -> dict[str, _Member]:
-    """The headers of the arrays we know, each agreeing with the zip directory about its size."""
-    known = {f"{name}.npy" for name in MEMBERS} | {
-        f"scheme{k}_{name}.npy" for k in range(MAX_SCHEMES) for name in SCHEME_MEMBERS
-    }
-    members: dict[str, _Member] = {}
-    for info in archive.infolist():
-        if info.filename not in known:
-            continue
-        name = info.filename.removesuffix(".npy")
-        if name in members:
-            raise AssetError(f"{name} is there twice")
-        with archive.open(info) as stream:
-            start = stream.read(10)
-            length = int.from_bytes(start[8:10], "little")
-            match = HEADER.fullmatch(stream.read(length))
-        if start[:8] != b"\x93NUMPY\x01\x00" or match is None:
-            raise AssetError(f"{name} is not a plain array")
-        shape = tuple(int(n) for n in match[3].replace(b",", b" ").split())
-        member = _Member(name, np.dtype(match[1].decode()), shape, match[2] == b"True", 10 + length)
-        if member.offset + _count(shape) * member.dtype.itemsize != info.file_size:
-            raise AssetError(
-                f"{name} claims shape {shape}, the file holds {info.file_size} bytes of it"
-            )
-        members[name] = member
-    missing = [name for name in REQUIRED if name not in members]
-    if missing:
-        raise AssetError(f"{missing[0]} is missing")
-    total = sum(_count(m.shape) * max(8, m.dtype.itemsize) for m in members.values())
-    if total > MAX_BYTES:
-        raise AssetError(f"unpacks to {total >> 20} MB; {MAX_BYTES >> 20} MB are accepted")
-    return members
-
-
-def _count(shape: tuple[int, ...]) -> int:
-    count = 1
-    for n in shape:  # Python integers: cannot overflow
-        count *= n
-    return count
-
-
-def _agreed_sizes(members: Mapping[str, _Member]) -> dict[str, int]:
+def _agreed_sizes(members: Mapping[str, Member]) -> dict[str, int]:
     """The size behind each letter; AssetError where two arrays differ, or a kind of number is wrong."""
     sizes: dict[str, int] = {}
     for name, (kinds, letters) in MEMBERS.items():
@@ -212,7 +133,7 @@ def _agreed_sizes(members: Mapping[str, _Member]) -> dict[str, int]:
             _agree(members[name], kinds, letters, sizes)
         if name == "mean":
             indptr = members.get("subdivision_indptr")
-            sizes["N"] = sizes["B"] if indptr is None else _count(indptr.shape) - 1
+            sizes["N"] = sizes["B"] if indptr is None else count(indptr.shape) - 1
             sizes["N+1"] = sizes["N"] + 1
     for k in range(MAX_SCHEMES):
         of_scheme: dict[str, int] = {}
@@ -233,7 +154,7 @@ def _agreed_sizes(members: Mapping[str, _Member]) -> dict[str, int]:
 
 
 def _agree(
-    member: _Member, kinds: str, letters: tuple[str | int, ...], sizes: dict[str, int]
+    member: Member, kinds: str, letters: tuple[str | int, ...], sizes: dict[str, int]
 ) -> None:
     wanted = ", ".join(str(sizes.get(str(x), x)) for x in letters)
     wrong = AssetError(f"{member.name} has shape {member.shape}, expected ({wanted})")
@@ -250,12 +171,6 @@ def _agree(
             agrees = sizes.setdefault(letter, n) == n
         if not agrees:
             raise wrong
-
-
-def _array(archive: zipfile.ZipFile, member: _Member) -> NDArray[Any]:
-    data = archive.read(f"{member.name}.npy")
-    flat = np.frombuffer(data, member.dtype, offset=member.offset)
-    return flat.reshape(member.shape, order="F" if member.fortran else "C")
 
 
 def _built(arrays: Mapping[str, NDArray[Any]], sizes: Mapping[str, int], path: Path) -> FaceModel:
@@ -280,6 +195,7 @@ def _built(arrays: Mapping[str, NDArray[Any]], sizes: Mapping[str, int], path: P
         regions=_regions(arrays),
         licence=str(arrays.get("licence", "")),
         source=str(arrays.get("source", "")),
+        unit=str(arrays.get("unit", "")),
         file_origin=_finite("file_origin", arrays.get("file_origin", np.zeros(3))),
     )
     return replace(model, subjects=_subjects(arrays, model)) if "subjects" in arrays else model
@@ -424,6 +340,7 @@ def _stored(model: FaceModel) -> dict[str, Any]:
         "name": model.name,
         "licence": model.licence,
         "source": model.source,
+        "unit": model.unit,
         "mean": model.control_mean,
         "modes": np.ascontiguousarray(model.control_modes.transpose(2, 0, 1)),
         "faces": model.faces,

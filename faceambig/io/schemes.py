@@ -90,6 +90,12 @@ def make_scheme(
     )
 
 
+def ibug68_sides() -> dict[str, str]:
+    """The side (right, left, mid) of each point of iBUG, by its number."""
+    scheme = load_scheme(asset_path("schemes/embedded_ibug68.csv"), "ibug68")
+    return dict(zip(scheme.points, scheme.sides, strict=True))
+
+
 def check_scheme(scheme: Scheme, n_vertices: int, file: str) -> Scheme:
     """`scheme`, if its vertices exist in a model of `n_vertices`."""
     highest = int(scheme.vertices.max())

@@ -597,3 +597,16 @@ def test_errors_are_put_on_one_line():
     assert one(ValueError("a\n  b\tc")) == "a b c"
     assert one(OSError(13, "Permission denied", "x.pts")) == "x.pts: Permission denied"
     assert one(RuntimeError()) == "RuntimeError"
+
+
+def test_a_reader_that_has_enough_is_no_error():
+    code = "from faceambig_app.cli import main; import sys; sys.exit(main())"
+    pipe, asked = subprocess.PIPE, ("models", "--scheme", "ibug68")
+    with subprocess.Popen(
+        [sys.executable, "-c", code, *asked], stdout=pipe, stderr=pipe
+    ) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.close()
+        assert process.stderr.read() == b""
+    assert process.returncode == 141

@@ -59,7 +59,7 @@ def numbers(page: Page) -> tuple[str, str, str]:
 
 
 def expected(state: ViewState, place: str) -> tuple[str, str, str]:
-    face = pipeline.face(state.target, state.fitting, state.bend)
+    face = faces.face(state.target, state.fitting, state.bend)
     return f"{place}", percent_number(face.d_l_percent), f"{face.d_s_mm:.1f}"
 
 
@@ -129,8 +129,8 @@ def test_difference_is_drawn_in_the_colours_of_its_scale(opened: Open):
     page.click("#difference")
     page.wait_for_timeout(300)
     picture = half(page, right=True)
-    face = pipeline.face(STATE.target, STATE.fitting, STATE.bend)
-    model = pipeline.model("embedded")
+    face = faces.face(STATE.target, STATE.fitting, STATE.bend)
+    model = fits.model("embedded")
     bar = page.locator(".bars i").first.bounding_box()
     assert bar is not None
     scale = bar["width"] / 0.05  # pixels a metre

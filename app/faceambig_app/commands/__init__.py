@@ -19,5 +19,5 @@ COMMANDS: tuple[tuple[str, ModuleType, str], ...] = (
     ("modes", modes, "other faces behind the same points: flexibility, posterior modes, extremes"),
     ("posterior", posterior, "how probable each distance is, and how open the face"),
     ("landmarks", landmarks, "find the points of a face in a photograph"),
-    ("models", models, "what a model holds: modes, landmark schemes"),
+    ("models", models, "what a model holds; convert one, install a free one"),
 )

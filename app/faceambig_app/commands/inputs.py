@@ -53,7 +53,7 @@ def add_input(command: argparse.ArgumentParser, *, shared: tuple[str, ...] = ())
         "--model", help="model name or path (default embedded, or that of a fit.json)"
     )
     people = command.add_argument_group("instead of FILE")
-    people.add_argument("--subject", metavar="N", help=help_of(FIELDS["subject"]))
+    people.add_argument("--subject", metavar="N", help="synthetic person [1 to 10]")
     for name in OF_SUBJECT:
         field = FIELDS[name]
         also = "; and of what is drawn" if name in shared else ""

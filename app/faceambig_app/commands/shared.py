@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     import faceambig as fa
 
-GOOD, NOT_CONVERGED, BAD_INPUT = 0, 1, 2
+GOOD, NOT_CONVERGED, BAD_INPUT, READER_GONE = 0, 1, 2, 141
 
 
 def add_outputs(command: argparse.ArgumentParser, table: str, picture: str) -> None:
