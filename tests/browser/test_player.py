@@ -13,7 +13,7 @@ from playwright.sync_api import Browser, Page
 
 from faceambig.arrays import vertex_normals
 from faceambig.compose import difference_colours, pivot
-from faceambig_app import pipeline, player
+from faceambig_app import faces, fits, player
 from faceambig_app.state import ViewState, changed
 from faceambig_app.text import percent_number
 
