@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from importlib.metadata import version
 
+from .fits import model
 from .forms import to_json
-from .pipeline import model
 from .state import ViewState
 
 

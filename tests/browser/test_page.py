@@ -204,6 +204,7 @@ def test_view_buttons_say_which_is_on_and_turn_the_heads(me):
 def test_through_the_camera_the_eyes_keep_their_distance(me):
     me.tab.get_by_role("button", name="Through camera").click()
     me.until(lambda: me.state.view == "camera", "the button was not heard")
+    me.rest()
     corners = fits.model("embedded").scheme("ibug68").vertices[[36, 39, 42, 45]].tolist()
     gaps = []
     for centimetres in (30, 240):

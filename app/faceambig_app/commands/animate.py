@@ -57,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
         raise ValueError("--mode: is of --what mode, not of the distance")
     state = state_of(options)
 
-    from ..pipeline import writable, write
+    from ..files import writable, write
 
     writable(out)  # before the work, not after it
     if ending == ".html":
