@@ -145,9 +145,7 @@ class Browser:
             case "reset":
                 self._travel(history.reset(self._history))
             case "copy_link":
-                self.script.copy(
-                    query(self.room.state)
-                )  # a link: the script puts the page before it
+                self.script.copy_link(query(self.room.state))
             case "copy_command":
                 self.script.copy(command(self.room.state))
 

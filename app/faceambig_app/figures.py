@@ -112,7 +112,8 @@ def spoken(numbers: Numbers, *, hide: Collection[str] = ()) -> str:
             d_l=d_l,
             d_s=f"{numbers.d_s_mm:.1f}",
         )
-    return f'<div class="fa-hidden" aria-live="polite">{escape(sentence)}</div>'
+    # What is replaced is not read aloud: the page's script says it in an element of its own, that stays
+    return f'<div class="fa-hidden" aria-hidden="true" data-fa-spoken="">{escape(sentence)}</div>'
 
 
 def heads_words(scene: Scene) -> str:

@@ -132,10 +132,17 @@ class Script:
 
     def copy(self, text: str) -> int:
         """Put a text on the clipboard; the number that `Copied` will name."""
+        return self._copy(text, link=False)
+
+    def copy_link(self, query: str) -> int:
+        """Put a link to this page on the clipboard; the browser knows its own address, a server may not."""
+        return self._copy(query, link=True)
+
+    def _copy(self, text: str, link: bool) -> int:
         with self._lock:
             self._copies += 1
             n = self._copies
-        self._send("copy", {"text": text, "n": n})
+        self._send("copy", {"text": text, "n": n, "link": link})
         return n
 
     def blink(self, nodes: Sequence[str], seconds: float = 0.5) -> None:
@@ -180,9 +187,8 @@ class Script:
                 log_line(str(error))
             self._warned = True
             return
-        if isinstance(
-            report, Key
-        ):  # the page has ended it: else the next data would begin it again
+        # The page has ended it, else the next data would begin it again; never begun here, it may be another's
+        if isinstance(report, Key) and "blink" in self._data:
             self.blink(())
         self._heard(report)
 

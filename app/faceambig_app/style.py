@@ -74,8 +74,12 @@ canvas[data-engine]{background:#F3F6F9}[data-mantine-color-scheme=dark] canvas[d
 .mantine-Slider-markLabel{margin-top:7px;font-size:calc(11px*var(--fa-scale,1))!important;color:var(--fa-dim)!important}
 label[for]{color:var(--fa-dim)!important;letter-spacing:0!important;font-size:calc(13px*var(--fa-scale,1))!important}
 [data-mantine-color-scheme=dark] [style*="color: var(--mantine-primary-color-filled)"]{color:#7AB7FF!important}
+.mantine-Button-root[data-variant=outline]{--button-color:var(--fa-dl)!important;
+--button-bd:1px solid var(--fa-dl)!important}
 @media(max-width:576px){.mantine-Paper-root[style*="20em"]{width:100%!important;left:0!important;right:0!important}
-.mantine-ScrollArea-content>div[style*="20em"]{width:100%!important}}
+.mantine-ScrollArea-content>div[style*="20em"]{width:100%!important}
+.fa{line-height:1.35}.fa h1{margin:.2em 0}.fa-card{padding:4px 8px}
+.fa-card span{font-size:calc(22px*var(--fa-scale,1))}}
 """
 
 STYLE = f"<style>{_TOKENS}{_TEXT}{_CARDS}{_PHOTO}{_PLOTS}{_VISER}</style>"

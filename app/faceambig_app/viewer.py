@@ -32,7 +32,7 @@ FIRST_POSITION, FIRST_FOV = (
     (0.0, 0.0, LENS),
     0.0257,
 )  # of a browser that has heard nothing yet; no view uses this angle
-ARRIVAL = 1.0  # seconds a browser may take to go where it is put
+ARRIVAL = 5.0  # seconds a browser may take to go where it is put; a busy one took more than 1 when it connected
 ORBIT_REST = 0.25  # seconds without a turn before the place is told
 SAME_TURN, SAME_ZOOM = 0.6, 0.01  # degrees and share that a rounded place may be off
 
@@ -101,8 +101,7 @@ class Viewer:
         camera = self._client.camera
         self._size = (camera.image_width, camera.image_height)
         self._looked_at = time.monotonic()
-        if self._timer is not None:
-            self._timer.cancel()
+        self._keep_quiet()
         if isinstance(view, Lens):
             self._look_through(view)
             return
@@ -152,8 +151,9 @@ class Viewer:
     def _wider(self) -> float:
         """How many times more must be seen on this canvas for the outermost heads to be whole at zoom 1."""
         camera = self._client.camera
+        high = 0.5 / PHONE_HEADS_AT if self.phone else 1.0  # the sheet leaves the upper part
         return max(
-            1.0, self._half_width / ZOOM_1 * camera.image_height / max(1, camera.image_width)
+            high, self._half_width / ZOOM_1 * camera.image_height / max(1, camera.image_width)
         )
 
     def _see(self, board: NDArray[np.float64]) -> None:
@@ -177,11 +177,11 @@ class Viewer:
             return
         with self._client.atomic():
             self._see(_board(camera.wxyz))
-        now = time.monotonic()
         if self._aimed(camera):
             self._looked_at = -np.inf
-        elif now > self._looked_at + ARRIVAL:
-            self._tell_at_rest()
+            self._keep_quiet()
+        else:  # a hand; or on its way, and then it arrives before that is told
+            self._tell_after(max(ORBIT_REST, self._looked_at + ARRIVAL - time.monotonic()))
 
     def _aimed(self, camera: viser.CameraHandle) -> bool:
         position, fov = self._aim
@@ -190,12 +190,14 @@ class Viewer:
             and abs(camera.fov / fov - 1) < 1e-3
         )
 
-    def _tell_at_rest(self) -> None:
-        if self._orbited is None:
-            return
+    def _tell_after(self, seconds: float) -> None:
+        self._keep_quiet()
+        if self._orbited is not None:
+            self._timer = asyncio.get_running_loop().call_later(seconds, self._tell)
+
+    def _keep_quiet(self) -> None:
         if self._timer is not None:
             self._timer.cancel()
-        self._timer = asyncio.get_running_loop().call_later(ORBIT_REST, self._tell)
 
     def _tell(self) -> None:
         """Say where a hand has turned the viewer to; the place of the view itself is no news."""
@@ -204,8 +206,8 @@ class Viewer:
         back = self.sight.board[:, 2]
         half = LENS * np.tan(0.5 * self._client.camera.fov)
         place = (
-            round(float(np.degrees(np.arctan2(back[0], back[2]))), 1),
-            round(float(np.degrees(np.arcsin(np.clip(back[1], -1, 1)))), 1),
+            round(float(np.degrees(np.arctan2(back[0], back[2]))), 1) + 0.0,  # no minus zero
+            round(float(np.degrees(np.arcsin(np.clip(back[1], -1, 1)))), 1) + 0.0,
             round(float(ZOOM_1 * self._wider() / half), 2),
         )
         if not _same(self._view, place) and place not in self._told[-1:]:

@@ -11,13 +11,14 @@
 //   words      {lost, back, no_webgl, copy, close}: what this script itself says; the first ones come with the page
 //   report     {uuid}: the text control that takes reports; it is answered by "hello"
 //   address    {query}: what the address bar shows after "/?"; never a new entry of the history
-//   copy       {text, n}: to the clipboard, once for each n; answered by "copied"
+//   copy       {text, n, link}: to the clipboard, once for each n, answered by "copied"; a link: text is its query
 //   blink      {nodes, seconds}: one of these nodes is drawn at a time, `seconds` each; no nodes end it
 //   theme      {theme: auto | light | dark, text: 1 to 2}: kept in localStorage
 //   keys       {on}: whether keys without Ctrl, Alt or Meta are shortcuts
 // In what a panel shows:
 //   data-fa-copy="TEXT"                   a click, Enter or Space copies the text
 //   data-fa-host                          an element in which the page's own host and port are written
+//   data-fa-spoken                        its text is said to a screen reader, SILENCE after it changed last
 //   data-fa-photo="WIDTHxHEIGHT"          an element whose box shows a photograph of so many pixels
 //   data-fa-view="X,Y,WIDTH,HEIGHT"       on it: the part in the box, in pixels of the photograph; else all of it
 //   data-fa-place="1"                     on it: a click places a point

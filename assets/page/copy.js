@@ -1,5 +1,5 @@
 // ---- clipboard ------------------------------------------------------------------------------------------------------------
-readers.copy = ({ text, n }) => copy(text, n);
+readers.copy = ({ text, n, link }) => copy(link ? `${location.origin}/${text && "?" + text}` : text, n);
 
 async function copy(text, n) {
   let ok = true;

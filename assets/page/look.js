@@ -74,7 +74,15 @@ style.textContent = `
   :root { font-size: calc(100% * var(--fa-scale, 1)); }
   .mantine-Slider-thumb { width: 24px !important; height: 24px !important; border-radius: 50% !important; }
   .mantine-Slider-root { padding-block: 8px !important; }
-  .mantine-Button-root, .mantine-ActionIcon-root { min-height: 24px !important; min-width: 24px !important; }
+  .mantine-Button-root { min-height: 30px !important; height: auto !important; }
+  .mantine-ActionIcon-root, [role=button][aria-label$="panel area"] { min-height: 24px !important; min-width: 24px !important; }
+  .mantine-NumberInput-input { min-height: 24px !important; }
+  .mantine-NumberInput-controls { flex-direction: row-reverse !important; width: 52px !important; max-width: none !important;
+    height: 100% !important; }
+  .mantine-Input-wrapper:has(.mantine-NumberInput-controls) input { padding-inline-end: 56px !important; }
+  .mantine-NumberInput-control { flex: 0 0 26px !important; max-width: none !important; height: 100% !important;
+    border: 0 !important; }
+  .mantine-NumberInput-section:has(.mantine-NumberInput-controls) { width: 52px !important; }
   .mantine-Checkbox-inner, .mantine-Checkbox-input { width: 24px !important; height: 24px !important; }
   .mantine-Paper-root[role=button] { min-height: 24px; }
   button[aria-pressed="true"] { background: var(--mantine-primary-color-light); font-weight: 700; }
@@ -82,11 +90,12 @@ style.textContent = `
   [data-mantine-color-scheme=dark] :focus-visible { outline-color: #7ab7ff !important; }
   [data-fa-copy], [data-fa-place="1"] { cursor: pointer; }
   [data-fa-point] { cursor: grab; }
-  [data-fa-point], [data-fa-place="1"] { touch-action: none; }
+  [data-fa-place="1"] { touch-action: none; }
   .fa-status { position: fixed; top: 8px; left: 50%; transform: translateX(-50%); z-index: 1000; max-width: 90vw;
     padding: 6px 14px; border-radius: 8px; background: #1d2733; color: #fff; font: 14px/1.45 system-ui, sans-serif;
     pointer-events: none; }
   .fa-status:empty { padding: 0; }
+  .fa-spoken { position: absolute; width: 1px; height: 1px; overflow: hidden; clip-path: inset(50%); }
   .fa-loupe { position: fixed; z-index: 1000; width: 126px; height: 126px; border-radius: 50%; pointer-events: none;
     border: 2px solid #fff; box-shadow: 0 0 0 1px #1d2733; background-repeat: no-repeat; background-color: #cbd5e0; }
   .fa-loupe::before, .fa-loupe::after { content: ""; position: absolute; background: #c8102e; outline: 1px solid #fffc; }

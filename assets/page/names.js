@@ -48,6 +48,9 @@ function nameControls() {
       set(drawn.closest("button"), "aria-label", name);
     }
   }
+  for (const cross of document.querySelectorAll(".mantine-Notification-closeButton")) {
+    set(cross, "aria-label", words.close);
+  }
   for (const chevron of document.querySelectorAll(CHEVRON)) {
     const head = chevron.parentElement; // of a folder: viser lets only a mouse open it
     set(head, "role", "button");

@@ -143,6 +143,9 @@ document.addEventListener("pointerdown", (event) => {
   if (drag.touch) showLoupe(photo, at, event);
 });
 
+// A finger on a point drags it and scrolls nothing. `touch-action` of what is inside an SVG is not heeded.
+document.addEventListener("touchstart", (event) => drag?.index != null && event.preventDefault(), { passive: false });
+
 // Drawn anew, the photograph is another element.
 function photoOf({ index, photo }) {
   if (photo.isConnected) return photo;

@@ -33,10 +33,27 @@ onConnection.push((there) => {
   }
 });
 
+// ---- what a screen reader says --------------------------------------------------------------------------------------------
+// In an element that stays: a live region that comes with its words is not read. viser's panels replace theirs.
+const SILENCE = 600; // milliseconds after the last change
+const spoken = document.createElement("div");
+spoken.className = "fa-spoken";
+spoken.setAttribute("aria-live", "polite");
+let sentence = "";
+let speaking = null;
+
+function speak() {
+  const now = document.querySelector("[data-fa-spoken]")?.textContent || sentence;
+  if (now === sentence) return;
+  sentence = now;
+  clearTimeout(speaking);
+  speaking = setTimeout(() => (spoken.textContent = sentence), SILENCE);
+}
+
 let rest = () => say("");
 
 function begin() {
-  document.body.append(line);
+  document.body.append(line, spoken);
   if (!canDraw()) rest = () => say(words.no_webgl);
   rest();
 }
@@ -58,4 +75,5 @@ new MutationObserver(() => {
   nameCopies();
   readPhoto();
   nameHost();
+  speak();
 }).observe(document, { childList: true, subtree: true });

@@ -189,8 +189,8 @@ def test_size_ground_and_own_photo_reach_the_renderer(monkeypatch):
     export.files(STATE, "png")
     export.files(STATE, "png", scale=4, transparent=True, overlays=False, own_photo=True)
     assert asked == [
-        (False, {"scale": 1, "transparent": False, "overlays": True}),
-        (True, {"scale": 4, "transparent": True, "overlays": False}),
+        (False, {"scale": 1, "transparent": False, "overlays": True, "step": None}),
+        (True, {"scale": 4, "transparent": True, "overlays": False, "step": None}),
     ]
 
 

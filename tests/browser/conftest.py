@@ -7,10 +7,13 @@ import os
 import shutil
 import sys
 from collections.abc import Callable, Iterator
-from typing import NoReturn
+from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, Error, Page, sync_playwright
+
+from faceambig_app import server
+from visitor import PATIENCE, Visitor, give_up
 
 FLAGS = [
     "--use-angle=swiftshader",  # the same pixels with and without a graphics card
@@ -19,13 +22,6 @@ FLAGS = [
     "--disable-sync",
     "--no-first-run",
 ]
-
-
-def give_up(words: str) -> NoReturn:
-    """A skip with its reason; where CI=true, a failure."""
-    if os.environ.get("CI") == "true":
-        pytest.fail(words, pytrace=False)
-    pytest.skip(words)
 
 
 @pytest.fixture(scope="session")
@@ -60,6 +56,7 @@ def page_url(browser: Browser) -> Iterator[Callable[..., Page]]:
 
     def go(url: str, width: int = 800, height: int = 450) -> Page:
         page = browser.new_page(viewport={"width": width, "height": height})
+        page.set_default_timeout(PATIENCE)
         problems: list[str] = []
         page.on(
             "console",
@@ -73,6 +70,58 @@ def page_url(browser: Browser) -> Iterator[Callable[..., Page]]:
     yield go
     for page, problems in opened:
         page.close()
-        # viser's sorter of splats, which we do not draw, asks for eval once: the policy refuses it
-        left = [text for text in problems if "'unsafe-eval' is not an allowed source" not in text]
-        assert not left
+        assert not ours(problems)
+
+
+def ours(problems: list[str]) -> list[str]:
+    """viser's sorter of splats, which we do not draw, asks for eval once: the policy refuses it."""
+    return [text for text in problems if "'unsafe-eval' is not an allowed source" not in text]
+
+
+@pytest.fixture(scope="module")
+def served() -> Iterator[server.Page]:
+    """The page on a free port."""
+    page = server.Page("127.0.0.1", 0)
+    yield page
+    page.close()
+
+
+@pytest.fixture(scope="module")
+def visit(browser: Browser, served: server.Page) -> Iterator[Callable[..., Visitor]]:
+    """Opens the page in a context of its own: visit(width, height, query, option of the context...).
+
+    Small and coarse, for behaviour. After the module every console must have been clean.
+    """
+    opened: list[tuple[Any, list[str]]] = []
+
+    def go(
+        width: int = 1150, height: int = 560, query: str = "", dpr: float = 0.25, **options: Any
+    ) -> Visitor:
+        context = browser.new_context(viewport={"width": width, "height": height}, **options)
+        context.set_default_timeout(PATIENCE)
+        tab = context.new_page()
+        problems: list[str] = []
+        tab.on("console", lambda m: problems.append(m.text) if m.type == "error" else None)
+        tab.on("pageerror", lambda error: problems.append(str(error)))
+        opened.append((context, problems))
+        known = set(served._browsers)
+        tab.goto(f"{served.address}?fixedDpr={dpr:g}{query and '&' + query}")
+        return Visitor(tab, served, known)
+
+    yield go
+    for context, problems in opened:
+        context.close()
+        assert not ours(problems)
+
+
+@pytest.fixture(scope="module")
+def first_visitor(visit: Callable[..., Visitor]) -> Visitor:
+    """A browser at a desk."""
+    return visit(permissions=["clipboard-read", "clipboard-write"])
+
+
+@pytest.fixture
+def me(first_visitor: Visitor) -> Visitor:
+    """The browser at a desk, at the first state."""
+    first_visitor.start_again()
+    return first_visitor

@@ -13,11 +13,11 @@ import viser
 from playwright.sync_api import Page
 
 from faceambig_app import guard
+from visitor import PATIENCE
 
 pytestmark = pytest.mark.browser
 
 SIDE = 40  # vertices along an edge of the patch
-PATIENCE = 15_000  # milliseconds until something is seen: other tests share the processors
 MESH = """name => { let found; window.__viserMutable?.nodeRefFromName[name]?.traverse(o => {
   if (!found && o.isMesh) found = o }); return found }"""
 PIXEL = """() => { const c = __viserMutable.canvas, gl = c.getContext('webgl2'), b = new Uint8Array(4);

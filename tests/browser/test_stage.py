@@ -16,10 +16,10 @@ from faceambig.scene import Lines, Marks, Scene
 from faceambig_app import figures, guard
 from faceambig_app.stage import FAR, FIRST_FOV, FIRST_POSITION, NEAR, Stage
 from scenes import FRONT, head, photo, scene, strip
+from visitor import PATIENCE
 
 pytestmark = pytest.mark.browser
 
-PATIENCE = 20_000  # milliseconds until something is seen: other tests share the processors
 ROOTS = """() => Object.entries(__viserSceneTree.getState()).filter(([name, node]) =>
   node && name.endsWith("/head")).map(([name]) => name).sort()"""
 MATERIAL = """name => { let found; __viserMutable.nodeRefFromName[name]?.traverse(o => {

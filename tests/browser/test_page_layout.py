@@ -1,0 +1,116 @@
+"""The page in windows of several sizes: nothing cut off, room for a finger, and what axe-core finds.
+
+Pictures are kept in the folder FACEAMBIG_ARTEFACTS, to be looked at.
+"""
+
+from __future__ import annotations
+
+import importlib.resources
+import io
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from visitor import Visitor, artefacts, give_up
+
+pytestmark = pytest.mark.browser
+
+WINDOWS = [  # name, width, height
+    ("desktop", 1440, 900),
+    ("tablet", 820, 1180),
+    ("smallest_docked", 577, 900),
+    ("largest_sheet", 576, 900),
+    ("phone_large", 414, 896),
+    ("phone", 390, 844),
+    ("phone_small", 360, 740),
+]
+AUDITED = ("desktop", "phone")
+# What is wider than the box that shows it, or stands outside the window
+CUT = """() => { const cut = [], seen = e => e.checkVisibility() && e.clientWidth > 2 && !e.closest('.fa-hidden');
+  for (const e of document.querySelectorAll('.mantine-Button-label, label, .fa-card, .fa p, .fa h1, .fa span'))
+    if (seen(e) && e.scrollWidth > e.clientWidth + 1)
+      cut.push(`${e.textContent}: ${e.scrollWidth} in ${e.clientWidth}`);
+  for (const e of document.querySelectorAll('button, label, input, .fa-card, .fa-photo, [role=slider]')) {
+    const box = e.getBoundingClientRect();
+    if (e.checkVisibility() && (box.left < -0.5 || box.right > innerWidth + 0.5))
+      cut.push(`${e.textContent || e.ariaLabel || e.className}: from ${box.left} to ${box.right} of ${innerWidth}`) }
+  if (document.documentElement.scrollWidth > innerWidth) cut.push('the page scrolls sideways');
+  return cut }"""
+SMALL = """() => [...document.querySelectorAll(
+    'button, a[href], input:not([type=hidden]), summary, select, [role=slider], [role=button], [role=tab]')]
+  .filter(e => e.checkVisibility()).map(e => [e, e.getBoundingClientRect()])
+  .filter(([, box]) => box.width && (box.width < 24 || box.height < 24))
+  .map(([e, box]) => `${e.ariaLabel || e.textContent || e.className}: ${box.width} by ${box.height}`)"""
+AXE = """async () => (await axe.run(document, { resultTypes: ['violations'] })).violations.flatMap(
+  found => found.nodes.map(node => [found.impact, found.id, node.html.slice(0, 200), node.failureSummary]))"""
+# viser's own, that no style and no name of ours mends: (rule, part of the element) -> reason
+VISERS: dict[tuple[str, str], str] = {}
+
+
+@pytest.fixture(scope="module")
+def axe() -> str:
+    """The source of axe-core, of the wheel of axe-playwright-python."""
+    try:
+        file = importlib.resources.files("axe_playwright_python") / "axe.min.js"
+    except ModuleNotFoundError:
+        give_up("axe-core is not installed: pip install axe-playwright-python")
+    return file.read_text(encoding="utf-8")
+
+
+def found_by_axe(me: Visitor) -> list[str]:
+    """Serious and critical findings, without viser's."""
+    return [
+        f"{rule}: {html}: {why}"
+        for impact, rule, html, why in me.tab.evaluate(AXE)
+        if impact in ("serious", "critical")
+        and not any(rule == known and part in html for known, part in VISERS)
+    ]
+
+
+def look(me: Visitor) -> np.ndarray:
+    """(H, W, 3) the window as it is seen, without notices."""
+    png = me.tab.screenshot(style=".mantine-Notifications-root { display: none }")
+    return np.asarray(Image.open(io.BytesIO(png)).convert("RGB"))
+
+
+@pytest.mark.parametrize(("name", "width", "height"), WINDOWS, ids=[name for name, *_ in WINDOWS])
+def test_nothing_is_cut_off_and_a_finger_has_room(visit, tmp_path, request, name, width, height):
+    axe = request.getfixturevalue("axe") if name in AUDITED else ""
+    sheet = width < 577
+    # A phone has three pixels to one of the page; that must not make it a desk
+    me = visit(width, height, dpr=0.5, device_scale_factor=3 if name == "phone_small" else 1)
+    for scheme in ("light", "dark") if name in AUDITED else ("light",):
+        me.tab.emulate_media(color_scheme=scheme)
+        me.tab.wait_for_function(
+            "scheme => document.documentElement.dataset.mantineColorScheme === scheme", arg=scheme
+        )
+        picture = look(me)
+        Image.fromarray(picture).save(artefacts(tmp_path) / f"page_{name}_{scheme}.png")
+        assert_two_heads(me, picture, sheet)
+        if name in AUDITED:
+            me.tab.evaluate(axe)
+            assert not found_by_axe(me)
+    assert me.tab.locator(".fa-both").count() == (1 if width < 1100 else 0)
+    if sheet:  # the photograph and both numbers are seen before anything is scrolled
+        for part in (".fa-photo", ".fa-card.fa-dl", ".fa-card.fa-ds"):
+            box = me.tab.locator(part).bounding_box()
+            assert box["y"] >= 0.3 * height
+            assert box["y"] + box["height"] <= height, part
+    for tab in me.tab.get_by_role("tab").all():
+        tab.click()
+        me.tab.wait_for_function("tab => tab.ariaSelected === 'true'", arg=tab.element_handle())
+        assert not me.tab.evaluate(CUT), tab.inner_text()
+        assert not me.tab.evaluate(SMALL), tab.inner_text()
+    me.tab.context.close()
+
+
+def assert_two_heads(me: Visitor, picture: np.ndarray, sheet: bool) -> None:
+    """Skin, redder than blue by far, on both halves of what is seen of the scene."""
+    canvas, scale = me.canvas(), picture.shape[1] / me.tab.evaluate("() => innerWidth")
+    x0, x1 = (round(scale * x) for x in (canvas["x"], canvas["x"] + canvas["width"]))
+    scene = picture[: round((0.38 if sheet else 1) * len(picture)), x0:x1].astype(int)
+    skin = scene[:, :, 0] > scene[:, :, 2] + 25
+    left, right = np.array_split(skin, 2, axis=1)
+    assert left.mean() > 0.03  # of the narrowest scene, beside a docked panel, 0.048
+    assert right.mean() > 0.03
