@@ -38,6 +38,7 @@ from .script import (
     Copied,
     Dark,
     Gone,
+    Hand,
     Hello,
     Key,
     Point,
@@ -194,6 +195,8 @@ class Browser:
                 self._glide.stop()
                 if self.room.state.show == "blink":
                     self._go(changed(self.room.state, show="both"))
+            case Hand():
+                self.stage.by_hand()
             case Dark():
                 self._dark = report.on
                 self._dress()

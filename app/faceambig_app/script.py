@@ -56,6 +56,12 @@ class Key(Struct, frozen=True):
     name: Literal["Escape"]
 
 
+class Hand(Struct, frozen=True):
+    """A hand is turning the viewer: what the camera tells now is a person's will."""
+
+    on: bool
+
+
 class Dark(Struct, frozen=True):
     """The system has become dark, or light."""
 
@@ -69,7 +75,7 @@ class Copied(Struct, frozen=True):
     ok: bool
 
 
-Report = Hello | Point | Click | Gone | Key | Dark | Copied
+Report = Hello | Point | Click | Gone | Key | Hand | Dark | Copied
 
 
 class _Envelope(Struct, frozen=True, forbid_unknown_fields=True):
@@ -80,6 +86,7 @@ class _Envelope(Struct, frozen=True, forbid_unknown_fields=True):
     click: Click | UnsetType = UNSET
     gone: _Index | UnsetType = UNSET
     key: Literal["Escape"] | UnsetType = UNSET
+    hand: bool | UnsetType = UNSET
     dark: bool | UnsetType = UNSET
     copied: Copied | UnsetType = UNSET
 
@@ -101,7 +108,7 @@ def read_report(text: str) -> Report:
     if len(given) != 1:
         raise ValueError(f"report: {len(given)} kinds instead of one")
     name, value = given[0]
-    wrap = {"gone": Gone, "key": Key, "dark": Dark}.get(name)
+    wrap = {"gone": Gone, "key": Key, "hand": Hand, "dark": Dark}.get(name)
     return value if wrap is None else wrap(value)
 
 

@@ -70,6 +70,10 @@ class Stage:
         """Whether there is no room for a second panel."""
         return self._viewer.narrow
 
+    def by_hand(self) -> None:
+        """A hand is turning the viewer, as the page's script tells."""
+        self._viewer.by_hand()
+
     def show(self, scene: Scene, draft: bool) -> None:
         """Draw the heads; a draft has the coarse mesh. Call inside client.atomic()."""
         self._clear(scene)

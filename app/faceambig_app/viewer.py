@@ -79,6 +79,7 @@ class Viewer:
         self._timer: asyncio.TimerHandle | None = None
         self._aim = (np.array(FIRST_POSITION), FIRST_FOV)  # where the last look put the viewer
         self._size = (0, 0)  # pixels of the canvas the zoom was made for
+        self._by_hand = False  # whether a hand has moved the viewer since
         self._looked_at = -np.inf  # monotonic seconds: for a while the browser reports older places
         client.camera.on_update(self._turned)
 
@@ -96,11 +97,16 @@ class Viewer:
         if not stays:  # else a hand has brought the viewer there, and may be moving on
             self.look(view)
 
+    def by_hand(self) -> None:
+        """A hand is turning the viewer: only then is another place news. viser moves it by itself, too."""
+        self._by_hand = True
+
     def look(self, view: View | Lens) -> None:
         """Put the viewer where a view says, or where the subject's camera stands."""
         camera = self._client.camera
         self._size = (camera.image_width, camera.image_height)
         self._looked_at = time.monotonic()
+        self._by_hand = False
         self._keep_quiet()
         if isinstance(view, Lens):
             self._look_through(view)
@@ -201,7 +207,7 @@ class Viewer:
 
     def _tell(self) -> None:
         """Say where a hand has turned the viewer to; the place of the view itself is no news."""
-        if self._orbited is None or not isinstance(self._view, View):
+        if self._orbited is None or not self._by_hand or not isinstance(self._view, View):
             return
         back = self.sight.board[:, 2]
         half = LENS * np.tan(0.5 * self._client.camera.fov)

@@ -32,6 +32,7 @@
 //   click   {x, y}: a place on a photograph with data-fa-place
 //   gone    index: Delete on a point
 //   key     "Escape"
+//   hand    true: a hand is turning the viewer
 //   dark    whether the system is dark, when that changes
 //   copied  {n, ok}: n is 0 for data-fa-copy
 

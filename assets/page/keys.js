@@ -45,3 +45,25 @@ document.addEventListener("keydown", (event) => {
   event.preventDefault(); // Space would scroll
   event.target.click();
 });
+
+// A hand that turns the viewer: only then is a new place of the camera news for the state. viser also moves it by itself,
+// while a page opens, a panel is docked or the window grows.
+const HAND = 300; // ms between two reports of one hand
+let handAt = -Infinity;
+function byHand() {
+  if (performance.now() - handAt < HAND) return;
+  handAt = performance.now();
+  report("hand", true);
+}
+for (const kind of ["pointerdown", "pointermove", "wheel"]) {
+  window.addEventListener(
+    kind,
+    (event) => {
+      if (event.target === window.__viserMutable?.canvas && (kind !== "pointermove" || event.buttons)) byHand();
+    },
+    { capture: true, passive: true },
+  );
+}
+document.addEventListener("keydown", (event) => {
+  if (FLIES.test(event.code) && !event.target.closest?.(TYPING)) byHand(); // stopped above where a control has the key
+});

@@ -11,7 +11,18 @@ import pytest
 import viser
 
 from faceambig_app import script
-from faceambig_app.script import Click, Copied, Dark, Gone, Hello, Key, Point, is_dark, read_report
+from faceambig_app.script import (
+    Click,
+    Copied,
+    Dark,
+    Gone,
+    Hand,
+    Hello,
+    Key,
+    Point,
+    is_dark,
+    read_report,
+)
 
 HELLO = {
     "query": "distance=1.2",
@@ -34,6 +45,7 @@ HELLO = {
         ({"click": {"x": 0, "y": 9.25}}, Click(0.0, 9.25)),
         ({"gone": 0}, Gone(0)),
         ({"key": "Escape"}, Key("Escape")),
+        ({"hand": True}, Hand(True)),
         ({"dark": True}, Dark(True)),
         ({"copied": {"n": 2, "ok": False}}, Copied(2, False)),
     ],

@@ -275,14 +275,17 @@ def test_zoom_and_rise_are_the_views(enter):
     assert in_picture(client, np.zeros(3))[1] == pytest.approx(0.05 / (450 * pixel), rel=1e-3)
 
 
-def orbit(client: Client, places: list[tuple[float, float]], pause: float) -> None:
-    """A hand turns the viewer, then rests."""
+def orbit(
+    client: Client, shown: Stage, places: list[tuple[float, float]], *, by_hand: bool = True
+) -> None:
+    """A hand turns the viewer, or viser does, then it rests."""
 
     async def run() -> None:
         for place in places:
+            if by_hand:
+                shown.by_hand()
             client.camera.turn(*place)
             await client.camera.heard(client.camera)
-            await asyncio.sleep(pause)
         await asyncio.sleep(0.05)
 
     asyncio.run(run())
@@ -297,7 +300,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_turned_viewer_is_told_once_at_rest(enter, quick):
     client, shown = enter()
     shown.show(scene(view=FRONT), False)
-    orbit(client, [(5.0, 2.0), (11.0, 3.0), (20.04, 7.0)], 0.0)
+    orbit(client, shown, [(5.0, 2.0), (11.0, 3.0), (20.04, 7.0)])
     assert client.told == [(20.0, 7.0, 1.0)]
     right = np.array([np.cos(np.radians(20.04)), 0.0, -np.sin(np.radians(20.04))])
     assert client.node("/fit").position == pytest.approx(0.135 * right, abs=1e-6)
@@ -314,8 +317,8 @@ def test_a_turned_viewer_is_told_once_at_rest(enter, quick):
 def test_an_older_place_that_comes_back_late_does_not_pull_the_viewer(enter, quick):
     client, shown = enter()
     shown.show(scene(view=FRONT), False)
-    orbit(client, [(20.0, 7.0)], 0.0)
-    orbit(client, [(40.0, 7.0)], 0.0)
+    orbit(client, shown, [(20.0, 7.0)])
+    orbit(client, shown, [(40.0, 7.0)])
     assert client.told == [(20.0, 7.0, 1.0), (40.0, 7.0, 1.0)]
     looks = client.camera.looks
     for azimuth in (20.0, 40.0):
@@ -326,18 +329,27 @@ def test_an_older_place_that_comes_back_late_does_not_pull_the_viewer(enter, qui
 def test_where_the_viewer_was_put_is_no_news(enter, quick):
     client, shown = enter()
     shown.show(scene(view=View("free", 30.0, 10.0, 0.08)), False)
-    orbit(client, [(30.0, 10.0)], 0.0)
+    orbit(client, shown, [(30.0, 10.0)])
     assert client.told == []
+
+
+def test_what_no_hand_has_done_is_no_news(enter, quick):
+    client, shown = enter()
+    shown.show(scene(view=FRONT), False)
+    orbit(client, shown, [(20.0, 7.0)], by_hand=False)
+    assert client.told == []
+    orbit(client, shown, [(21.0, 7.0)])
+    assert client.told == [(21.0, 7.0, 1.0)]
 
 
 def test_until_the_browser_has_arrived_older_places_are_not_told(enter, monkeypatch):
     monkeypatch.setattr(viewer, "ORBIT_REST", 0.0)
     client, shown = enter()
     shown.show(scene(view=SIDE), False)
-    orbit(client, [(3.0, 0.0)], 0.0)  # on its way
+    orbit(client, shown, [(3.0, 0.0)])  # on its way
     assert client.told == []
-    orbit(client, [(-90.0, 0.0)], 0.0)  # there
-    orbit(client, [(-80.0, 0.0)], 0.0)  # a hand
+    orbit(client, shown, [(-90.0, 0.0)])  # there
+    orbit(client, shown, [(-80.0, 0.0)])  # a hand
     assert client.told == [(-80.0, 0.0, 1.0)]
 
 
