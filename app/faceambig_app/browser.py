@@ -8,16 +8,13 @@ from __future__ import annotations
 import logging
 import time
 from asyncio import AbstractEventLoop
-from collections.abc import Sequence
 from typing import cast
 
 import viser
 
-from faceambig.scene import Scene
-
-from . import figures, guard, history, own_page, photograph, pipeline, plots
+from . import figures, guard, history, own_page
 from .actions import ACTIONS
-from .faces import curve_key
+from .display import Display, Rest
 from .fields import FIELDS
 from .fits import model
 from .forms import command
@@ -25,14 +22,11 @@ from .glide import Glide
 from .link import query
 from .notices import from_query
 from .orders import Orders
-from .own import OwnFrame, OwnPhoto, own_frame, told_distance
 from .own_room import OwnRoom
 from .panel import Change, Panel
 from .panel.widgets import setting
-from .pipeline import Frame, frame, plots_of
 from .room import Dispatcher, Room
 from .saving import Saving
-from .scenes import photo_jpeg
 from .script import (
     Click,
     Copied,
@@ -49,13 +43,10 @@ from .script import (
 )
 from .stage import Stage
 from .state import DEFAULT, ViewState, changed
-from .style import STYLE, text_size
+from .style import STYLE
 from .text import say
-from .told import Slider, flex_lines, pins_of, sliders_of, spectrum_of, told
 
 log = logging.getLogger("faceambig")
-
-Contents = list[tuple[viser.GuiHtmlHandle, str]]
 
 HELLO = 0.5  # seconds to wait for the page's script to say which state the address asks for
 
@@ -77,9 +68,6 @@ class Browser:
         self._still = False  # whether this person wants no motion
         self._dark = False  # whether this person's system is dark
         self._owned = False  # whether there is a photograph of this person
-        self._curves_of: object = None  # what the plots show
-        self._rested: ViewState | None = None  # the state drawn in full last
-        self._picture_of: object = None  # what the photograph shows: (target, draft)
         self.stage = Stage(client, self._orbited)
         self._dress()
         self.script = Script(client.gui, self.report)
@@ -100,6 +88,7 @@ class Browser:
             client.gui, people, self.change, self.act, narrow=self.stage.narrow,
             own=self._own, use_hint=self._use_hint, saving=self._saving,
         )  # fmt: skip
+        self._display = Display(client, self.stage, self.panel, gone=lambda: self.room.left)
         style = STYLE + figures.hidden_boxes(self.panel.widgets.step_sliders)
         self.panel.places.style.content = style
         self.panel.show(self.room.state)
@@ -278,124 +267,17 @@ class Browser:
         self.notice(say("error.failed", cause=str(error)))
 
     def draw(self, state: ViewState, draft: bool) -> None:
-        """Compute a state and send it. Computing is done before the lock of atomic(), never inside."""
-        if state.subject == "photo":
-            self._draw_own(state, draft)
-            return
-        if draft:
-            shown = pipeline.draft(state, self._rested)
-        else:
-            shown = frame(state, with_curves=False)
-        self._send(self._contents(state, shown, draft), shown.scene, draft)
-        if draft:
-            return
-        self._rested = state
-        # Heads first: a new target's curves cost a sweep and a posterior
-        plot = plots.plots(plots_of(state), shown.scene.numbers, hide=state.hide)
-        self._curves_of = curve_key(state.target, state.fitting)
-        self._send([(self.panel.places.plots, plot), *self._others(state)])
-        self._loop.call_soon_threadsafe(self._settle, state, sliders_of(state), None)
+        """Compute a state and send it; called by one worker at a time."""
+        rest = self._display.draw(state, draft, self._own.photo)
+        if rest is not None:
+            self._loop.call_soon_threadsafe(self._settle, state, rest)
 
-    def _draw_own(self, state: ViewState, draft: bool) -> None:
-        own = self._own.photo
-        shown = own_frame(own, state, draft)
-        self._send(self._own_contents(own, state, shown, draft), shown.scene, draft)
-        if not draft:
-            hint = told_distance(own, state)
-            self._loop.call_soon_threadsafe(self._settle, state, shown.sliders, hint)
-
-    def _heading(self, state: ViewState, points: int) -> str:
-        actual = None if "actual" in state.hide else state.actual
-        return figures.heading(state.fitting.distance, actual, points)
-
-    def _others(self, state: ViewState) -> Contents:
-        """Other faces behind the same points, and those that were kept."""
-        at, pins = self.panel.places, pins_of(state)
-        return [
-            (at.flex, figures.flex_words(flex_lines(state))),
-            (at.spectrum, figures.spectrum(*spectrum_of(state))),
-            (at.pins, figures.pins(pins.names, pins.words, pins.d_s_mm)),
-        ]
-
-    def _send(self, html: Contents, scene: Scene | None = None, draft: bool = False) -> None:
-        if self.room.left:  # while this was computed
-            return
-        with self._client.atomic():
-            if scene is not None:
-                self.stage.show(scene, draft)
-            for handle, content in html:
-                handle.content = content
-        self._client.flush()
-
-    def _contents(self, state: ViewState, shown: Frame, draft: bool) -> Contents:
-        """What the elements of the panel show of a frame."""
-        at, scene, hide = self.panel.places, shown.scene, state.hide
-        cards = figures.cards(scene.numbers, hide=hide)
-        marks = photograph.photo_marks(scene.photo, crosses=False, hover=not draft)
-        html: Contents = [(at.crosses, photograph.photo_crosses(scene.photo))]
-        if self.stage.narrow:
-            html.append((at.marks, figures.side_by_side(marks, cards)))
-        else:
-            html += [(at.cards, cards), (at.marks, marks)]
-        if (
-            curve_key(state.target, state.fitting) == self._curves_of
-        ):  # else at rest, when all else is shown
-            html.append((at.plots, plots.plots(plots_of(state), scene.numbers, hide=hide)))
-        if (state.target, draft) != self._picture_of and not (
-            draft and self._picture_of == (state.target, False)
-        ):
-            html.append((at.picture, photograph.photo_picture(photo_jpeg(state.target, draft))))
-            self._picture_of = (state.target, draft)
-        if not draft:
-            html += self._at_rest(state, shown)
-        return html
-
-    def _own_contents(
-        self, own: OwnPhoto | None, state: ViewState, shown: OwnFrame, draft: bool
-    ) -> Contents:
-        """As `_contents`, of a person's own photograph."""
-        at, scene = self.panel.places, shown.scene
-        cards, marks = own_page.cards(own, state, scene), own_page.marks(own, scene)
-        html: Contents = [(at.crosses, "")]
-        if self.stage.narrow:  # one below the other: a finger needs a large photograph
-            html.append((at.marks, marks + cards))
-        else:
-            html += [(at.cards, cards), (at.marks, marks)]
-        taken = None if own is None else own.taken
-        if self._picture_of is not taken or taken is None:
-            picture = "" if taken is None else photograph.photo_picture(taken.jpeg)
-            html.append((at.picture, picture))
-            self._picture_of = taken
-        if not draft:
-            self._curves_of = None
-            words = own_page.spoken(own, state, scene) + figures.heads_words(scene)
-            html += [
-                (at.plots, own_page.curves(own, state, scene)),
-                (at.legend, "" if scene.legend is None else figures.legend(scene.legend)),
-                (at.spoken, words),
-                (at.data, self.panel.spoken(state) + text_size(state.text)),
-                *((place, "") for place in (at.flex, at.spectrum, at.pins)),
-                (at.heading, own_page.heading(own, state)),
-            ]
-        return html
-
-    def _at_rest(self, state: ViewState, shown: Frame) -> Contents:
-        at, scene = self.panel.places, shown.scene
-        legend = "" if scene.legend is None else figures.legend(scene.legend)
-        spoken = figures.spoken(scene.numbers, hide=state.hide) + figures.heads_words(scene)
-        return [
-            (at.legend, figures.told(told(state)) + legend),
-            (at.spoken, spoken),
-            (at.data, self.panel.spoken(state) + text_size(state.text)),
-            (at.heading, self._heading(state, shown.points)),
-        ]
-
-    def _settle(self, drawn: ViewState, sliders: Sequence[Slider], hint: float | None) -> None:
+    def _settle(self, drawn: ViewState, rest: Rest) -> None:
         """At rest, on the loop: what the controls show is what is, even where messages crossed on the way."""
         if not self.room.left and self.room.state == drawn:
-            self._hint = hint
+            self._hint = rest.hint
             self._show_own()
             self.script.address(query(drawn))
-            self.panel.flex.tell(sliders)
+            self.panel.flex.tell(rest.sliders)
             self.panel.show(drawn)
             guard.restate(self._client, self.panel.controls)

@@ -100,7 +100,7 @@ def interval_words(curves: Curves) -> str:
 
 def likely_words(curves: Curves) -> str:
     """The intervals of the posterior and what lies beyond the axis, as sentences."""
-    words = []
+    words = [say("plot.likely_lead")]
     for share, (low, high) in zip((50, 95), curves.intervals, strict=False):
         near = centimetres(_rounded(low))
         if np.isinf(high):

@@ -33,6 +33,7 @@ async def update(api: Any, client_id: Any, message: Any) -> None:
     if take_report(door, client_id, control, message.updates):
         return
     before = door.held.pop((client_id, message.uuid), None)
+    _typed.discard(message.uuid)
     if before is not None:
         before.timer.cancel()
     if message.updates.keys() != {"value"} or control.disabled or not control.visible:
@@ -50,6 +51,7 @@ async def update(api: Any, client_id: Any, message: Any) -> None:
         settle = partial(_settle, door, api, client_id, control, message)
         timer = api._event_loop.call_later(TYPING, lambda: _task(settle()))
         door.held[client_id, message.uuid] = Held(asked, put, timer)
+        _typed.add(message.uuid)
     else:
         _put_back(api, client_id, control)
         door.refuse(client_id, control, asked, put)
@@ -58,6 +60,7 @@ async def update(api: Any, client_id: Any, message: Any) -> None:
 async def _settle(door: Door, api: Any, client_id: Any, control: Any, message: Any) -> None:
     """Nobody types any more: the nearest value is set, and said."""
     held = door.held.pop((client_id, message.uuid), None)
+    _typed.discard(message.uuid)
     if held is None or control._impl.removed:
         return
     message.updates["value"] = held.put
@@ -69,6 +72,7 @@ async def _settle(door: Door, api: Any, client_id: Any, control: Any, message: A
     door.refuse(client_id, control, held.asked, held.put)
 
 
+_typed: set[str] = set()  # fields in which half a number stands
 _tasks: set[asyncio.Task[None]] = set()  # asyncio forgets tasks that nobody holds
 
 
@@ -91,9 +95,11 @@ def restate(client: viser.ClientHandle, controls: Iterable[Any]) -> None:
     """Send the values of controls, those that the server has not changed too.
 
     A value of ours that crosses an older one of the browser's on the way is shown there and is wrong here; saying it
-    once more when nobody moves ends the disagreement.
+    once more when nobody moves ends the disagreement. A field that is being typed into keeps what stands there.
     """
     for control in controls:
+        if control._impl.uuid in _typed:
+            continue
         message = _messages.GuiUpdateMessage(control._impl.uuid, {"value": control.value})
         client._websock_connection.queue_message(message)
 

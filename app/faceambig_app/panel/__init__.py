@@ -72,9 +72,9 @@ class Panel:
             side.set_width(SIDE_WIDTH)
         tabs = gui.add_tab_group()
         with tabs.add_tab(say("panel.explore")):
-            explore.build_distance(w)
+            explore.build_first(w)
             cards, legend, plots = gui.add_html(""), gui.add_html(""), gui.add_html("")
-            explore.build_rest(w, people)
+            explore.build_photo(w, people)
             self.flex = flex.Flex(w)
             explore.build_data(w)
             explore.build_history(w)

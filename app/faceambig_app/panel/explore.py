@@ -14,17 +14,17 @@ from .widgets import Widgets
 NAMED_VIEWS = tuple(name for name in FIELDS["view"].choices if name != "free")
 
 
-def build_distance(w: Widgets) -> None:
-    """The slider that the page is about, and the same in figures."""
+def build_first(w: Widgets) -> None:
+    """What a newcomer sees: the slider that the page is about, the same in figures, and how to look."""
     w.distance("distance")
     w.centimetres("distance", "distance_cm")
     w.actions("play", ("glide",))
-
-
-def build_rest(w: Widgets, people: Mapping[Any, str]) -> None:
-    """What stands below the numbers and the plots."""
     w.buttons("view", NAMED_VIEWS)
     w.buttons("show", ("both", "overlay", "blink", "difference"))
+
+
+def build_photo(w: Widgets, people: Mapping[Any, str]) -> None:
+    """Folders of who is in the photo, and how."""
     with folder(w, "photo"):
         w.dropdown("subject", people)
         w.distance("actual")

@@ -1,0 +1,157 @@
+"""Display: what one browser shows of a state. A worker computes it and sends it; nothing here hears a person.
+
+Scenes become nodes (stage), words and plots the contents of the panel's elements.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import viser
+
+from faceambig.scene import Scene
+
+from . import figures, own_page, photograph, pipeline, plots
+from .faces import curve_key
+from .own import OwnFrame, OwnPhoto, own_frame, told_distance
+from .panel import Panel
+from .pipeline import Frame, frame, plots_of
+from .scenes import photo_jpeg
+from .stage import Stage
+from .state import ViewState
+from .style import text_size
+from .told import Slider, flex_lines, pins_of, sliders_of, spectrum_of, told
+
+Contents = list[tuple[viser.GuiHtmlHandle, str]]
+
+
+class Rest(NamedTuple):
+    """What the widgets are told of a state at rest."""
+
+    sliders: Sequence[Slider]  # of the flexibility modes
+    hint: float | None  # metres: of the camera, as the own photograph's file tells it
+
+
+class Display:
+    """The elements and nodes of one browser. `gone` says whether the browser has left meanwhile."""
+
+    def __init__(
+        self, client: viser.ClientHandle, stage: Stage, panel: Panel, *, gone: Callable[[], bool]
+    ) -> None:
+        self._client, self._stage, self._panel, self._gone = client, stage, panel, gone
+        self._curves_of: object = None  # what the plots show
+        self._rested: ViewState | None = None  # the state drawn in full last
+        self._picture_of: object = None  # what the photograph shows: (target, draft)
+
+    def draw(self, state: ViewState, draft: bool, own: OwnPhoto | None) -> Rest | None:
+        """Compute a state and send it; a draft is for while a hand moves, and says nothing.
+
+        Computing is done before the lock of atomic(), never inside.
+        """
+        if state.subject == "photo":
+            return self._draw_own(own, state, draft)
+        if draft:
+            shown = pipeline.draft(state, self._rested)
+        else:
+            shown = frame(state, with_curves=False)
+        self._send(self._contents(state, shown, draft), shown.scene, draft)
+        if draft:
+            return None
+        self._rested = state
+        # Heads first: a new target's curves cost a sweep and a posterior
+        plot = plots.plots(plots_of(state), shown.scene.numbers, hide=state.hide)
+        self._curves_of = curve_key(state.target, state.fitting)
+        self._send([(self._panel.places.plots, plot), *self._others(state)])
+        return Rest(sliders_of(state), None)
+
+    def _draw_own(self, own: OwnPhoto | None, state: ViewState, draft: bool) -> Rest | None:
+        shown = own_frame(own, state, draft)
+        self._send(self._own_contents(own, state, shown, draft), shown.scene, draft)
+        return None if draft else Rest(shown.sliders, told_distance(own, state))
+
+    def _heading(self, state: ViewState, points: int) -> str:
+        actual = None if "actual" in state.hide else state.actual
+        return figures.heading(state.fitting.distance, actual, points)
+
+    def _others(self, state: ViewState) -> Contents:
+        """Other faces behind the same points, and those that were kept."""
+        at, pins = self._panel.places, pins_of(state)
+        return [
+            (at.flex, figures.flex_words(flex_lines(state))),
+            (at.spectrum, figures.spectrum(*spectrum_of(state))),
+            (at.pins, figures.pins(pins.names, pins.words, pins.d_s_mm)),
+        ]
+
+    def _send(self, html: Contents, scene: Scene | None = None, draft: bool = False) -> None:
+        if self._gone():  # while this was computed
+            return
+        with self._client.atomic():
+            if scene is not None:
+                self._stage.show(scene, draft)
+            for handle, content in html:
+                handle.content = content
+        self._client.flush()
+
+    def _contents(self, state: ViewState, shown: Frame, draft: bool) -> Contents:
+        """What the elements of the panel show of a frame."""
+        at, scene, hide = self._panel.places, shown.scene, state.hide
+        cards = figures.cards(scene.numbers, hide=hide)
+        marks = photograph.photo_marks(scene.photo, crosses=False, hover=not draft)
+        html: Contents = [(at.crosses, photograph.photo_crosses(scene.photo))]
+        if self._stage.narrow:
+            html.append((at.marks, figures.side_by_side(marks, cards)))
+        else:
+            html += [(at.cards, cards), (at.marks, marks)]
+        if (
+            curve_key(state.target, state.fitting) == self._curves_of
+        ):  # else at rest, when all else is shown
+            html.append((at.plots, plots.plots(plots_of(state), scene.numbers, hide=hide)))
+        if (state.target, draft) != self._picture_of and not (
+            draft and self._picture_of == (state.target, False)
+        ):
+            html.append((at.picture, photograph.photo_picture(photo_jpeg(state.target, draft))))
+            self._picture_of = (state.target, draft)
+        if not draft:
+            html += self._at_rest(state, shown)
+        return html
+
+    def _own_contents(
+        self, own: OwnPhoto | None, state: ViewState, shown: OwnFrame, draft: bool
+    ) -> Contents:
+        """As `_contents`, of a person's own photograph."""
+        at, scene = self._panel.places, shown.scene
+        cards, marks = own_page.cards(own, state, scene), own_page.marks(own, scene)
+        html: Contents = [(at.crosses, "")]
+        if self._stage.narrow:  # one below the other: a finger needs a large photograph
+            html.append((at.marks, marks + cards))
+        else:
+            html += [(at.cards, cards), (at.marks, marks)]
+        taken = None if own is None else own.taken
+        if self._picture_of is not taken or taken is None:
+            picture = "" if taken is None else photograph.photo_picture(taken.jpeg)
+            html.append((at.picture, picture))
+            self._picture_of = taken
+        if not draft:
+            self._curves_of = None
+            words = own_page.spoken(own, state, scene) + figures.heads_words(scene)
+            html += [
+                (at.plots, own_page.curves(own, state, scene)),
+                (at.legend, "" if scene.legend is None else figures.legend(scene.legend)),
+                (at.spoken, words),
+                (at.data, self._panel.spoken(state) + text_size(state.text)),
+                *((place, "") for place in (at.flex, at.spectrum, at.pins)),
+                (at.heading, own_page.heading(own, state)),
+            ]
+        return html
+
+    def _at_rest(self, state: ViewState, shown: Frame) -> Contents:
+        at, scene = self._panel.places, shown.scene
+        legend = "" if scene.legend is None else figures.legend(scene.legend)
+        spoken = figures.spoken(scene.numbers, hide=state.hide) + figures.heads_words(scene)
+        return [
+            (at.legend, figures.told(told(state)) + legend),
+            (at.spoken, spoken),
+            (at.data, self._panel.spoken(state) + text_size(state.text)),
+            (at.heading, self._heading(state, shown.points)),
+        ]
