@@ -173,7 +173,7 @@ def test_points_are_found_dragged_and_the_photograph_is_gone_on_remove(visit, se
     me.press("Undo the last point")
     me.until(lambda: me.circles() == circles, "the drag is not taken back")
     me.press("Use the file's distance")
-    me.until(lambda: f"distance={cm / 100:.3g}" in me.tab.url, "the distance is not used")
+    me.until(lambda: f"distance={cm / 100:.3g}" in me.tab.url, f"{cm} cm is not used")
     assert "subject=photo" in me.tab.url
     assert len(me.tab.url) < 120  # nothing of the photograph
 

@@ -14,6 +14,7 @@ from playwright.sync_api import Page
 
 from faceambig.scene import Lines, Marks, Scene
 from faceambig_app import figures, guard
+from faceambig_app.script import Script
 from faceambig_app.stage import FAR, FIRST_FOV, FIRST_POSITION, NEAR, Stage
 from scenes import FRONT, head, photo, scene, strip
 from visitor import PATIENCE
@@ -34,6 +35,7 @@ class Show:
     def __init__(self, tab: Page, client: Any) -> None:
         self.tab, self.client, self.told = tab, client, []
         self.stage = Stage(client, lambda *place: self.told.append(place))
+        self.script = Script(client.gui, lambda _: self.stage.by_hand())
 
     def draw(self, shown: Scene) -> None:
         with self.client.atomic():
