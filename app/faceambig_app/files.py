@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
-
-from faceambig.io.files import replacing
+from tempfile import TemporaryDirectory
 
 
 def writable(path: Path) -> None:
@@ -36,7 +35,15 @@ def write_pairs(files: Iterable[tuple[Path, bytes]]) -> None:
     path = None
     try:
         with ExitStack() as stack:
+            beside: dict[Path, Path] = {}  # folder of files -> where they wait
+            waiting: dict[Path, Path] = {}
             for path, data in files:
-                stack.enter_context(replacing(path)).write_bytes(data)
+                if path.parent not in beside:
+                    made = TemporaryDirectory(dir=path.parent, prefix=".faceambig-")
+                    beside[path.parent] = Path(stack.enter_context(made))
+                waiting[path] = beside[path.parent] / path.name
+                waiting[path].write_bytes(data)
+            for path, whole in waiting.items():
+                whole.replace(path)
     except OSError as error:
         raise ValueError(f"out: cannot write {str(path)!r}: {error.strerror}") from error
