@@ -172,7 +172,9 @@ def test_points_are_found_dragged_and_the_photograph_is_gone_on_remove(visit, se
     me.until(lambda: me.numbers() and me.numbers()[0] > d_l, "d_L stays")
     me.press("Undo the last point")
     me.until(lambda: me.circles() == circles, "the drag is not taken back")
-    me.press("Use the file's distance")
+    hint = me.button("Use the file's distance")  # told anew at rest
+    me.until(lambda: hint.inner_text() == label, "the file's distance is still that of the drag")
+    hint.click()
     me.until(lambda: f"distance={cm / 100:.3g}" in me.tab.url, f"{cm} cm is not used")
     assert "subject=photo" in me.tab.url
     assert len(me.tab.url) < 120  # nothing of the photograph
