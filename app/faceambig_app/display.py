@@ -42,6 +42,9 @@ class Display:
         self._client, self._stage, self._panel, self._gone = client, stage, panel, gone
         self._curves_of: object = None  # what the plots show
         self._rested: ViewState | None = None  # the state drawn in full last
+        self._crosses_of: object = (
+            None  # (target, whether they are shown); None: none of a target's
+        )
         self._picture_of: object = None  # what the photograph shows: (target, draft)
 
     def draw(self, state: ViewState, draft: bool, own: OwnPhoto | None) -> Rest | None:
@@ -98,7 +101,11 @@ class Display:
         at, scene, hide = self._panel.places, shown.scene, state.hide
         cards = figures.cards(scene.numbers, hide=hide)
         marks = photograph.photo_marks(scene.photo, crosses=False, hover=not draft)
-        html: Contents = [(at.crosses, photograph.photo_crosses(scene.photo))]
+        html: Contents = []
+        crosses = (state.target, scene.photo.points_shown)
+        if crosses != self._crosses_of:  # 0.3 ms that a hand on the distance does not need
+            html.append((at.crosses, photograph.photo_crosses(scene.photo)))
+            self._crosses_of = crosses
         if self._stage.narrow:
             html.append((at.marks, figures.side_by_side(marks, cards)))
         else:
@@ -106,7 +113,8 @@ class Display:
         if (
             curve_key(state.target, state.fitting) == self._curves_of
         ):  # else at rest, when all else is shown
-            html.append((at.plots, plots.plots(plots_of(state), scene.numbers, hide=hide)))
+            curves = plots.plots(plots_of(state), scene.numbers, hide=hide, brief=draft)
+            html.append((at.plots, curves))
         if (state.target, draft) != self._picture_of and not (
             draft and self._picture_of == (state.target, False)
         ):
@@ -123,6 +131,7 @@ class Display:
         at, scene = self._panel.places, shown.scene
         cards, marks = own_page.cards(own, state, scene), own_page.marks(own, scene)
         html: Contents = [(at.crosses, "")]
+        self._crosses_of = None
         if self._stage.narrow:  # one below the other: a finger needs a large photograph
             html.append((at.marks, marks + cards))
         else:

@@ -26,11 +26,13 @@ AUTOMATIC_PERCENT = 5.0  # the gap of points that a program finds
 MOST_ROWS = 25  # of the table
 
 
-def plots(curves: Curves, numbers: Numbers, *, hide: Collection[str] = ()) -> str:
+def plots(
+    curves: Curves, numbers: Numbers, *, hide: Collection[str] = (), brief: bool = False
+) -> str:
     """The curves against the assumed distance, the range that cannot be told apart in words, and a table.
 
     `hide` of Scene: "numbers" leaves out words and table, "truth" the curve of d_S, "actual" the line of the true
-    distance.
+    distance. brief: without the table, for while a hand moves.
     """
     told, true = "numbers" not in hide, "truth" not in hide
     top = d_s_axis(curves, numbers)
@@ -51,7 +53,7 @@ def plots(curves: Curves, numbers: Numbers, *, hide: Collection[str] = ()) -> st
     ]
     below = [interval_words(curves), *([likely_words(curves)] if likely else [])] if told else []
     said = "".join(f"<p><small>{escape(text)}</small></p>" for text in below)
-    said += table(curves, true) if told else ""
+    said += table(curves, true) if told and not brief else ""
     return f'<div class="fa"><div class="fa-wide">{"".join(parts)}</div>{said}</div>'
 
 

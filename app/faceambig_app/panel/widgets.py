@@ -52,7 +52,9 @@ class Widgets:
     def show(self, state: ViewState) -> None:
         """Write a state into the widgets; on the event loop only, so an older value never overwrites a newer one."""
         for handle, read in self._shown:
-            handle.value = read(state)
+            value = read(state)
+            if handle.value != value:  # asked first: viser looks up types at every assignment
+                handle.value = value
         for watch in self._watchers:
             watch(state)
 
