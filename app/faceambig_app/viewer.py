@@ -24,6 +24,7 @@ LENS = 20.0  # metres to the viewer: a head 0.2 m deep is true to 0.5 %
 NEAR, FAR = 0.5, 60.0  # with 18 and 22 the canvas stayed blank behind a background picture
 ZOOM_1 = 0.165  # metres above and below the centre at zoom 1
 BESIDE = 0.12  # metres: half a head and a little air, beyond the outermost slots
+HAND_COUNTS = 10.0  # seconds: a hand's last move may be told so much later on a slow machine
 STEEPEST = 89.0  # degrees: straight from above "up" has no direction
 NARROW = 1100  # pixels: two panels of 372 leave too little for two heads
 PHONE = 577  # pixels: at most 576 wide, viser shows its panel as a sheet over the lower part
@@ -79,7 +80,7 @@ class Viewer:
         self._timer: asyncio.TimerHandle | None = None
         self._aim = (np.array(FIRST_POSITION), FIRST_FOV)  # where the last look put the viewer
         self._size = (0, 0)  # pixels of the canvas the zoom was made for
-        self._by_hand = False  # whether a hand has moved the viewer since
+        self._hand_at = -np.inf  # monotonic seconds: when a hand last moved the viewer
         self._looked_at = -np.inf  # monotonic seconds: for a while the browser reports older places
         client.camera.on_update(self._turned)
 
@@ -99,14 +100,13 @@ class Viewer:
 
     def by_hand(self) -> None:
         """A hand is turning the viewer: only then is another place news. viser moves it by itself, too."""
-        self._by_hand = True
+        self._hand_at = time.monotonic()
 
     def look(self, view: View | Lens) -> None:
         """Put the viewer where a view says, or where the subject's camera stands."""
         camera = self._client.camera
         self._size = (camera.image_width, camera.image_height)
         self._looked_at = time.monotonic()
-        self._by_hand = False
         self._keep_quiet()
         if isinstance(view, Lens):
             self._look_through(view)
@@ -207,7 +207,9 @@ class Viewer:
 
     def _tell(self) -> None:
         """Say where a hand has turned the viewer to; the place of the view itself is no news."""
-        if self._orbited is None or not self._by_hand or not isinstance(self._view, View):
+        if self._orbited is None or not isinstance(self._view, View):
+            return
+        if time.monotonic() - self._hand_at > HAND_COUNTS:
             return
         back = self.sight.board[:, 2]
         half = LENS * np.tan(0.5 * self._client.camera.fov)
