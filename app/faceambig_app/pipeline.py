@@ -16,22 +16,10 @@ from faceambig.compose import shown_surface
 from faceambig.scene import Curves, Scene
 
 from .faces import curve, likely_curve
-from .faces import (
-    face as face,  # the steps are handed on here: who asks for a frame asks for them too
-)
-from .files import writable as writable
 from .files import write
-from .files import write_all as write_all
-from .files import write_pairs as write_pairs
-from .fits import fitted as fitted
-from .fits import model as model
-from .fits import n_fitted
-from .fits import photograph as photograph
-from .likely import bending as bending
+from .fits import model, n_fitted
 from .likely import source, spread
 from .origin import origin
-from .scenes import photo_jpeg as photo_jpeg
-from .scenes import picture as picture
 from .scenes import scene_of
 from .state import Bend, Look, ViewState
 
@@ -102,11 +90,6 @@ def _in_store(state: ViewState, rested: ViewState | None) -> bool:
         return same and rested.extreme is not None
     same = source(rested.target, rested.fitting) == source(state.target, state.fitting)
     return same and rested.extreme is None and rested.draw is not None
-
-
-def curve_of(state: ViewState) -> Curves:
-    """The curves of a state's target."""
-    return curve(state.target, state.fitting)
 
 
 def plots_of(state: ViewState) -> Curves:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from .explore import folder
 from .widgets import Widgets
 
-BLINKS = ("blink", "overlay")
-
 
 def build(w: Widgets) -> None:
     """The widgets of the tab."""
