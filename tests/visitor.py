@@ -86,8 +86,9 @@ class Visitor:
         self.browser._loop.call_soon_threadsafe(change)
 
     def start_again(self) -> None:
-        """The first state with an empty past, nothing focused, the first tab."""
+        """The first state with an empty past, nothing focused or in the way, the first tab."""
         self.tab.evaluate("() => document.activeElement?.blur()")
+        self.close_notices()
         self.tab.mouse.move(2, 2)
         self.do(lambda: self.browser._travel(History(DEFAULT)))
         self.until(lambda: self.state == DEFAULT and not self.browser._history.past, "no start")
@@ -95,6 +96,12 @@ class Visitor:
         explore = self.tab.get_by_role("tab", name="Explore", exact=True)
         if explore.get_attribute("aria-selected") != "true":
             explore.click()
+
+    def close_notices(self) -> None:
+        """Notices stand over the scene, and a pointer that goes down on one turns nothing."""
+        close = """() => { const all = document.querySelectorAll(".mantine-Notification-closeButton");
+            all.forEach(button => button.click()); return all.length }"""
+        self.until(lambda: self.tab.evaluate(close) == 0, "a notice does not close")
 
     def mesh(self, name: str, rows: list[int] | None = None) -> np.ndarray:
         """(n, 3) positions on the page's graphics card: every 37th vertex, or `rows`."""

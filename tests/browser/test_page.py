@@ -156,8 +156,11 @@ def test_heads_stay_side_by_side_while_the_viewer_goes_round_and_the_wheel_chang
     x, y = canvas["x"] + canvas["width"] / 2, canvas["y"] + canvas["height"] / 2
     bars = [bar(me, f"/{name}/board/bar") for name in ("true", "fit")]
     assert bars == pytest.approx([0.05, 0.05], rel=1e-5)
+    me.close_notices()
     for turn in range(3):
         me.tab.mouse.move(x, y)
+        under = me.tab.evaluate("([x, y]) => document.elementFromPoint(x, y).tagName", [x, y])
+        assert under == "CANVAS", "something is in the way of the pointer"
         me.tab.mouse.down()
         me.tab.mouse.move(x + 90 + 40 * turn, y + 10, steps=6)
         me.tab.mouse.up()
