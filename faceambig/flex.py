@@ -13,6 +13,7 @@ pose: the camera follows the bend, and surface change is what rigid alignment le
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal, NamedTuple, cast, get_args
 
 import numpy as np
@@ -157,6 +158,7 @@ class FlexibilityModes:
         return int(mode)
 
 
+@lru_cache(maxsize=128)
 def plausible_range(n_modes: int) -> tuple[float, float]:
     """Least and largest |alpha| of a plausible face: mean -+ 3 sd of chi with S = n_modes (paper, section 6.4)."""
     mean = np.sqrt(2.0) * np.exp(gammaln((n_modes + 1) / 2) - gammaln(n_modes / 2))

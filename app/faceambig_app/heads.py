@@ -75,6 +75,8 @@ class HeadNodes:
         # Directly below the root, where both meshes stand: the first of the fine vertices are the coarse ones
         self._colours = add_colours(scene, root, shaded(head))
         self._painted: object = head.colours
+        self._behind = False  # whether the full mesh has an older face than the coarse one
+        self._looks: object = None  # of the meshes: (draft, seen, opacity)
         self._offset = 0.0  # metres along the viewer's right
         self._wanted: Board | None = Board(head.title, 0.0, (), 0.0)  # no scene's
         self._placed: object = (
@@ -87,17 +89,34 @@ class HeadNodes:
 
     def show(self, points: NDArray[np.float64], head: Head, draft: bool) -> None:
         """Send what changed of the head at `points` (V, 3), metres; equal arrays send nothing."""
-        draft = draft and self._coarse is not None
-        vertices, seen = points.astype(np.float32), head.opacity > 0
-        opacity = head.opacity if head.opacity < 1 else None  # None: sorted as a solid
-        if not draft:
+        self._move(points, draft)
+        self._look(head, draft)
+
+    def keep(self, head: Head, draft: bool) -> bool:
+        """As `show` at the points that the meshes have; False if a coarse mesh alone has them and a full one is due."""
+        if not draft and self._behind:
+            return False
+        self._look(head, draft)
+        return True
+
+    def _move(self, points: NDArray[np.float64], draft: bool) -> None:
+        self._behind = draft and self._coarse is not None
+        vertices = points.astype(np.float32)
+        if not self._behind:
             self._full.vertices = vertices
         if self._coarse is not None:  # at rest too: an invisible mesh must not keep an older face
             self._coarse.vertices = vertices[: self._n_coarse]
-            self._coarse.visible = draft and seen
-            self._coarse.opacity = opacity
-        self._full.visible = seen and not draft
-        self._full.opacity = opacity
+
+    def _look(self, head: Head, draft: bool) -> None:
+        draft = draft and self._coarse is not None
+        seen, opacity = head.opacity > 0, head.opacity if head.opacity < 1 else None
+        if (draft, seen, opacity) != self._looks:  # asked here: viser takes 10 us to ask
+            self._looks = draft, seen, opacity
+            if self._coarse is not None:
+                self._coarse.visible = draft and seen
+                self._coarse.opacity = opacity
+            self._full.visible = seen and not draft
+            self._full.opacity = opacity  # None: sorted as a solid
         if head.colours is not self._painted:
             self._painted = head.colours
             self._colours.colors = shaded(head)

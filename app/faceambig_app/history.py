@@ -15,6 +15,7 @@ from .state import DEFAULT, ViewState, changed
 STEPS = 100
 STEP_CLOSES = 0.4  # seconds after the last change
 VIEW = tuple(name for name, field in FIELDS.items() if field.view)
+NOT_VIEW = tuple(name for name, field in FIELDS.items() if not field.view)
 OF_THE_READER = ("theme", "text")  # a reset leaves them: they are about eyes, not faces
 
 
@@ -72,4 +73,4 @@ def _seen_as(state: ViewState, now: ViewState) -> ViewState:
 
 def _same(a: ViewState, b: ViewState) -> bool:
     """Whether two states differ by nothing but where the viewer is."""
-    return a == b or a == _seen_as(b, a)
+    return all(getattr(a, name) == getattr(b, name) for name in NOT_VIEW)

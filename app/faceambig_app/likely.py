@@ -66,6 +66,7 @@ def bending(target: Target, fitting: Fitting, flex_at: str, count: int) -> Flexi
     return fa.flexibility_modes(fit.model, fit, count=count, linearisation=linearisation)
 
 
+@lru_cache(maxsize=512)
 def flex_modes(target: Target, fitting: Fitting, flex_at: str, count: int) -> tuple[FlexMode, ...]:
     """The first `count` modes of a fit in words."""
     modes = bending(target, fitting, flex_at, count)

@@ -7,7 +7,9 @@ hand is the circles. White halos: on skin the two colours alone are too weak.
 from __future__ import annotations
 
 import base64
+import math
 from dataclasses import replace
+from functools import lru_cache
 from html import escape
 
 import numpy as np
@@ -114,9 +116,7 @@ def _crosses_path(photo: Photo) -> str:
 def _crosses_and_circles(photo: Photo, crosses: bool, apart: bool) -> str:
     """Both, with their halo; `apart`: the crosses are drawn elsewhere, each for itself."""
     unit = _unit(photo)
-    circles = "".join(
-        _circle(x, y, CIRCLE * unit) for x, y in photo.projected if np.isfinite(x + y)
-    )
+    circles = _circles(photo.projected, CIRCLE * unit)
     thin, halo = 1.7 * unit, 3.4 * unit
     halves = "" if apart else '<use href="#fx"/>'
     red = "" if apart else f'<use href="#fx" stroke="{RED}"/>'
@@ -147,15 +147,23 @@ def _buttons(photo: Photo) -> str:
 
 def _hover(photo: Photo, landmarks: IntArray | None) -> str:
     """An unseen spot on each point whose title names it and its gap."""
-    gaps, parts = gaps_mm(photo, landmarks), []
-    for index, (x, y) in enumerate(photo.observed):
-        if np.isfinite(x + y):
-            gap = f"{gaps[index]:.1f}" if np.isfinite(gaps[index]) else "?"
-            words = say("photo.gap", name=_name(photo, index), mm=gap)
+    parts = []
+    for index, gap in enumerate(gaps_mm(photo, landmarks).tolist()):
+        x, y = photo.observed[index].tolist()
+        if math.isfinite(x + y):
+            before, after = _gap_words(_name(photo, index))
+            mm = f"{gap:.1f}" if math.isfinite(gap) else "?"
             parts.append(
-                f'<path class="fa-hit" d="M{x:.1f} {y:.1f}h.01"><title>{escape(words)}</title></path>'
+                f'<path class="fa-hit" d="M{x:.1f} {y:.1f}h.01"><title>{before}{mm}{after}</title></path>'
             )
     return "".join(parts)
+
+
+@lru_cache(maxsize=512)
+def _gap_words(name: str) -> tuple[str, str]:
+    """What stands before and after the millimetres of a point, escaped; a class asks for 68 of them many times."""
+    before, _, after = escape(say("photo.gap", name=name, mm="\0")).partition("\0")
+    return before, after
 
 
 def _name(photo: Photo, index: int) -> str:
@@ -218,8 +226,12 @@ def _alternative(photo: Photo, landmarks: IntArray | None) -> str:
     )
 
 
+@lru_cache(maxsize=1)
 def _key() -> str:
-    cross, circle = _sign(_cross(6, 6, 4), "seen"), _sign(_circle(6, 6, 4.5), "dl")
+    cross, circle = (
+        _sign(_cross(6, 6, 4), "seen"),
+        _sign(_circles(np.array([[6.0, 6.0]]), 4.5), "dl"),
+    )
     return (
         f'<div class="fa-key"><span>{cross}{escape(say("app.cross"))}</span>'
         f"<span>{circle}{escape(say('app.circle'))}</span></div>"
@@ -237,5 +249,10 @@ def _cross(x: float, y: float, r: float) -> str:
     )
 
 
-def _circle(x: float, y: float, r: float) -> str:
-    return f"M{x - r:.1f} {y:.1f}a{r:.1f} {r:.1f} 0 1 0 {2 * r:.1f} 0a{r:.1f} {r:.1f} 0 1 0 {-2 * r:.1f} 0"
+def _circles(points: Array, r: float) -> str:
+    """One path; a hand on a slider asks for it some ten times a second."""
+    starts = points - (r, 0.0)
+    starts = starts[np.isfinite(starts).all(axis=1)]
+    two = 2 * r
+    round_ = f"a{r:.1f} {r:.1f} 0 1 0 {two:.1f} 0a{r:.1f} {r:.1f} 0 1 0 {-two:.1f} 0"
+    return "".join([f"M{x:.1f} {y:.1f}{round_}" for x, y in starts.tolist()])

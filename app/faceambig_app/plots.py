@@ -5,7 +5,9 @@ Colours are CSS variables of style.STYLE. The same numbers stand in a table that
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
+from functools import lru_cache
 from html import escape
 
 import numpy as np
@@ -17,6 +19,7 @@ from .text import NARROW, centimetres, percent_number, say
 
 WIDTH, LEFT, RIGHT = 340, 34, 330  # in SVG units
 NEAREST, FARTHEST = 0.2, 3.0  # metres, of the axis
+OCTAVES = math.log2(FARTHEST / NEAREST)
 TICKS_CM = (20, 30, 60, 120, 240)
 D_L_TOP, D_L_BOTTOM, D_S_TOP, D_S_BOTTOM = 24, 94, 128, 222
 LIKELY_TOP, LIKELY_BOTTOM = 256, 300
@@ -24,6 +27,7 @@ BARS_AT = (324, 310)  # of the middle halves and the 95 %, below the density
 D_L_MAX = 6.0  # percent
 AUTOMATIC_PERCENT = 5.0  # the gap of points that a program finds
 MOST_ROWS = 25  # of the table
+KEPT = 64  # curves whose unmoving part is kept: a class drags over one photograph each
 
 
 def plots(
@@ -36,31 +40,61 @@ def plots(
     """
     told, true = "numbers" not in hide, "truth" not in hide
     top = d_s_axis(curves, numbers)
-    likely = curves.density is not None
-    last = LIKELY_BOTTOM if likely else D_S_BOTTOM
-    ticks_at = BARS_AT[0] + 7 if likely else D_S_BOTTOM
     words = escape(_alternative(curves, numbers) if told and true else say("plot.alt_hidden"))
+    ground = _ground(curves, numbers.reference, top, true, "actual" not in hide)
+    cursor, said = (
+        _cursor(numbers, top, _last(curves), true),
+        _said(curves, true, not brief) if told else "",
+    )
+    return (
+        f'<div class="fa"><div class="fa-wide"><svg class="fa-plot" viewBox="0 0 {WIDTH} {_ticks_at(curves) + 40}" '
+        f'role="img" aria-label="{words}">{ground}{cursor}</svg></div>{said}</div>'
+    )
+
+
+def _last(curves: Curves) -> int:
+    """Where the lowest plot ends."""
+    return D_S_BOTTOM if curves.density is None else LIKELY_BOTTOM
+
+
+def _ticks_at(curves: Curves) -> int:
+    return D_S_BOTTOM if curves.density is None else BARS_AT[0] + 7
+
+
+@lru_cache(maxsize=KEPT)
+def _ground(curves: Curves, reference: str, top: float, true: bool, actual: bool) -> str:
+    """All of the plots but the cursor: what stays while a hand moves the distance."""
+    ticks_at = _ticks_at(curves)
     parts = [
-        f'<svg class="fa-plot" viewBox="0 0 {WIDTH} {ticks_at + 40}" role="img" aria-label="{words}">',
         *_d_l_plot(curves),
-        *_d_s_plot(curves, numbers, top, true),
-        *(_likely_plot(curves) if likely else ()),
+        *_d_s_plot(curves, reference, top, true),
+        *(() if curves.density is None else _likely_plot(curves)),
         *(_tick(cm, ticks_at) for cm in TICKS_CM),
         f'<text x="{(LEFT + RIGHT) / 2}" y="{ticks_at + 35}" text-anchor="middle">{escape(say("plot.axis"))}</text>',
-        _true_line(curves, last) if "actual" not in hide else "",
-        _cursor(numbers, top, last, true),
-        "</svg>",
+        _true_line(curves, _last(curves)) if actual else "",
     ]
-    below = [interval_words(curves), *([likely_words(curves)] if likely else [])] if told else []
+    return "".join(parts)
+
+
+@lru_cache(maxsize=KEPT)
+def _said(curves: Curves, true: bool, with_table: bool) -> str:
+    """The sentences below the plots, and the table."""
+    below = [interval_words(curves), *([] if curves.density is None else [likely_words(curves)])]
     said = "".join(f"<p><small>{escape(text)}</small></p>" for text in below)
-    said += table(curves, true) if told and not brief else ""
-    return f'<div class="fa"><div class="fa-wide">{"".join(parts)}</div>{said}</div>'
+    return said + (table(curves, true) if with_table else "")
+
+
+@lru_cache(maxsize=KEPT)
+def _ranges(curves: Curves) -> tuple[float, float, float, float]:
+    """Least and largest d_L in percent and d_S in millimetres."""
+    d_l, d_s = curves.d_l_percent, curves.d_s_mm
+    return float(d_l.min()), float(d_l.max()), float(d_s.min()), float(d_s.max())
 
 
 def d_s_axis(curves: Curves, numbers: Numbers) -> float:
     """End of the d_S axis: 12 mm, growing in steps of 4."""
-    largest = max(float(curves.d_s_mm.max()), numbers.d_s_mm)
-    return 4.0 * max(3, int(np.ceil(largest / 4.0)))
+    largest = max(_ranges(curves)[3], numbers.d_s_mm)
+    return 4.0 * max(3, math.ceil(largest / 4.0))
 
 
 def told_apart(curves: Curves) -> tuple[float, float] | None:
@@ -152,10 +186,11 @@ def table(curves: Curves, true: bool = True) -> str:
 
 
 def _alternative(curves: Curves, numbers: Numbers) -> str:
+    least_l, most_l, least_s, most_s = _ranges(curves)
     return say(
         "plot.alt",
-        d_l=f"{percent_number(curves.d_l_percent.min())} - {percent_number(curves.d_l_percent.max())}{NARROW}%",
-        d_s=f"{curves.d_s_mm.min():.1f} - {curves.d_s_mm.max():.1f}{NARROW}mm",
+        d_l=f"{percent_number(least_l)} - {percent_number(most_l)}{NARROW}%",
+        d_s=f"{least_s:.1f} - {most_s:.1f}{NARROW}mm",
         now=centimetres(numbers.distance),
     )
 
@@ -174,13 +209,9 @@ def _d_l_plot(curves: Curves) -> list[str]:
     ]
 
 
-def _d_s_plot(curves: Curves, numbers: Numbers, top: float, true: bool) -> list[str]:
+def _d_s_plot(curves: Curves, reference: str, top: float, true: bool) -> list[str]:
     line = _line(_x(curves.distances), _y(curves.d_s_mm, top, D_S_TOP, D_S_BOTTOM))
-    title = (
-        say("plot.d_s")
-        if not numbers.reference
-        else say("plot.d_s_to", reference=numbers.reference)
-    )
+    title = say("plot.d_s_to", reference=reference) if reference else say("plot.d_s")
     return [
         _title(title, D_S_TOP, "ds"),
         *(_grid(value, top, D_S_TOP, D_S_BOTTOM) for value in range(0, int(top) + 1, 4)),
@@ -202,7 +233,7 @@ def _likely_plot(curves: Curves) -> list[str]:
     for share, at, width, (low, high) in zip(
         (50, 95), BARS_AT, (6, 3), curves.intervals, strict=False
     ):
-        a, b = (float(_x(np.clip(end, NEAREST, FARTHEST))) for end in (low, high))
+        a, b = (_across(min(max(end, NEAREST), FARTHEST)) for end in (low, high))
         parts.append(f'<text x="{LEFT - 4}" y="{at + 4}" text-anchor="end">{share}{NARROW}%</text>')
         parts.append(
             f'<path d="M{a:.1f} {at}H{b:.1f}" stroke="var(--fa-ink)" stroke-width="{width}"/>'
@@ -222,9 +253,13 @@ def _note(y: float, text: str) -> str:
     return f'<text x="{RIGHT - 3}" y="{y:.1f}" text-anchor="end">{escape(text)}</text>'
 
 
-def _x(metres: Array | float) -> Array:
-    low, high = np.log2(NEAREST), np.log2(FARTHEST)
-    return LEFT + (np.log2(metres) - low) / (high - low) * (RIGHT - LEFT)
+def _x(metres: Array) -> Array:
+    return LEFT + np.log2(metres / NEAREST) / OCTAVES * (RIGHT - LEFT)
+
+
+def _across(metres: float) -> float:
+    """As `_x`, of one distance."""
+    return LEFT + math.log2(metres / NEAREST) / OCTAVES * (RIGHT - LEFT)
 
 
 def _y(values: Array, top_value: float, top: int, bottom: int) -> Array:
@@ -232,7 +267,7 @@ def _y(values: Array, top_value: float, top: int, bottom: int) -> Array:
 
 
 def _at(value: float, top_value: float, top: int, bottom: int) -> float:
-    return float(_y(np.array(value), top_value, top, bottom))
+    return bottom - min(max(value, 0.0), top_value) / top_value * (bottom - top)
 
 
 def _d_l(value: float) -> float:
@@ -252,7 +287,7 @@ def _grid(value: float, top_value: float, top: int, bottom: int) -> str:
 
 
 def _tick(cm: int, at: int) -> str:
-    x = float(_x(cm / 100))
+    x = _across(cm / 100)
     return (
         f'<path d="M{x:.1f} {at}v4" stroke="var(--fa-dim)"/>'
         f'<text x="{x:.1f}" y="{at + 17}" text-anchor="middle">{cm}</text>'
@@ -268,7 +303,7 @@ def _upright(x: float, last: int) -> str:
 def _true_line(curves: Curves, last: int) -> str:
     if not NEAREST <= curves.true_distance <= FARTHEST:
         return ""
-    x = float(_x(curves.true_distance))
+    x = _across(curves.true_distance)
     anchor, shift = ("end", -4) if x > (LEFT + RIGHT) / 2 else ("start", 4)
     return (
         f'<path d="{_upright(x, last)}" stroke="var(--fa-dim)" stroke-dasharray="2 3"/>'
@@ -280,7 +315,7 @@ def _true_line(curves: Curves, last: int) -> str:
 def _cursor(numbers: Numbers, d_s_top: float, last: int, true: bool) -> str:
     if numbers.distance is None:
         return ""
-    x = float(_x(numbers.distance))
+    x = _across(numbers.distance)
     a, b = _d_l(numbers.d_l_percent), _at(numbers.d_s_mm, d_s_top, D_S_TOP, D_S_BOTTOM)
     square = (
         f'<rect x="{x - 4.2:.1f}" y="{b - 4.2:.1f}" width="8.4" height="8.4" fill="var(--fa-ds)"/>'

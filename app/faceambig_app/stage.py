@@ -6,6 +6,8 @@ Heads of one slot are drawn over each other: a ghost, or two faces in turn. On t
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import viser
 from numpy.typing import NDArray
@@ -51,6 +53,8 @@ class Stage:
     def __init__(self, client: viser.ClientHandle, orbited: Orbited | None = None) -> None:
         self._client, self._scene = client, client.scene
         self._heads: dict[str, HeadNodes] = {}
+        # Of each head's meshes: vertices, as the one array they came in, and pivot
+        self._where: dict[str, tuple[NDArray[np.float64], tuple[float, ...]] | None] = {}
         self._points: dict[tuple[str, str], PointNodes] = {}
         self._lines: dict[tuple[str, str], LineNodes] = {}
         self._blink: viser.GuiHtmlHandle | None = None
@@ -90,7 +94,12 @@ class Stage:
                 nodes = self._heads[head.name] = HeadNodes(self._client, head)
             seen = not through or _at_camera(scene, head) is not None
             if seen:
-                nodes.show(_points(scene, head), head, draft)
+                # A hand on the distance moves the fitted face alone
+                where = None if through else (head.vertices, scene.pivot)
+                same = where is not None and _is(self._where.get(head.name), where)
+                if not (same and nodes.keep(head, draft)):
+                    nodes.show(_points(scene, head), head, draft)
+                    self._where[head.name] = where
             nodes.write(None if through else _board(scene, head, self._viewer.sight))
             nodes.stand(0.0 if through else head.slot - middle, seen)
         self._mark(scene, draft)
@@ -113,6 +122,7 @@ class Stage:
                 held.pop(key).remove()
         for name in gone:
             self._heads.pop(name).remove()
+            self._where.pop(name, None)
 
     def _mark(self, scene: Scene, draft: bool) -> None:
         """Points and lines; not through the subject's camera, where the photograph has them."""
@@ -180,6 +190,10 @@ def _points(scene: Scene, head: Head) -> NDArray[np.float64]:
     """(V, 3) metres: about the pivot; through the subject's camera, where the camera sees them."""
     seen = _at_camera(scene, head) if scene.through_camera else None
     return head.vertices - scene.pivot if seen is None else seen * TO_WORLD
+
+
+def _is(before: tuple[Any, Any] | None, now: tuple[Any, Any]) -> bool:
+    return before is not None and before[0] is now[0] and before[1] == now[1]
 
 
 def _at_camera(scene: Scene, head: Head) -> NDArray[np.float64] | None:

@@ -6,6 +6,9 @@ States that mean the same are equal: every value is brought into its canonical f
 
 from __future__ import annotations
 
+import copy
+from collections.abc import Callable
+from operator import attrgetter
 from typing import Any, NamedTuple, TypeVar
 
 import msgspec
@@ -121,8 +124,12 @@ class ViewState(
             value = canonical(field, getattr(self, name))
             if field.kind == "pins" and value:
                 value = _pinned(value, self.model)
-            # The one place where a state is written to: it is being made
+            # A state is written to here and in changed() only: it is being made
             msgspec.structs.force_setattr(self, name, value)
+        self.check()
+
+    def check(self) -> None:
+        """ValueError where two fields contradict each other."""
         if self.view == "free" and self.orbit is None:
             raise ValueError("view: free needs an orbit, the viewer's azimuth and elevation")
 
@@ -148,11 +155,15 @@ class ViewState(
         return self._part(Look)
 
     def _part(self, part: type[_P]) -> _P:
-        return part(*(getattr(self, name) for name in part._fields))
+        return part(*_FIELDS_OF[part](self))
 
 
+_FIELDS_OF: dict[type[Any], Callable[[ViewState], tuple[Any, ...]]] = {
+    part: attrgetter(*part._fields) for part in (Target, Bend, Look)
+}
 _OF_A_FACE = tuple(n for n, f in FIELDS.items() if f.part in ("target", "fitting", "bend"))
 _NOT_OF_A_FACE = tuple(name for name in FIELDS if name not in _OF_A_FACE)
+_ALONE = FIELDS.keys() - {"model", "pins"}  # what no other field's value depends on
 
 
 def short(state: ViewState) -> ViewState:
@@ -178,7 +189,14 @@ def _is_short(pin: ViewState, model: str) -> bool:
 
 def changed(state: ViewState, **values: Any) -> ViewState:
     """`state` with some fields changed; ValueError if a value is out of range."""
-    return msgspec.structs.replace(state, **values)
+    if not values.keys() <= _ALONE:
+        return msgspec.structs.replace(state, **values)
+    # The rest is as it may stand already: a hand on a slider asks for this some ten times a second
+    made = copy.copy(state)
+    for name, value in values.items():
+        msgspec.structs.force_setattr(made, name, canonical(FIELDS[name], value))
+    made.check()
+    return made
 
 
 DEFAULT = ViewState()

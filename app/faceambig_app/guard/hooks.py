@@ -13,7 +13,14 @@ from typing import Any
 
 import viser
 import websockets.asyncio.server
-from viser import _client_autobuild, _gui_api, _gui_handles, _scene_api, _viser
+from viser import (
+    _assignable_props_api,
+    _client_autobuild,
+    _gui_api,
+    _gui_handles,
+    _scene_api,
+    _viser,
+)
 from viser.infra import _infra
 
 from .door import DOOR, VISER, Door, ServeError, log_line
@@ -29,6 +36,7 @@ _opening: Door | None = None
 _opening_one = threading.Lock()
 _installed = False
 
+_real_cast = _assignable_props_api.AssignablePropsBase._cast_value_recursive
 _real_serve = websockets.asyncio.server.serve
 
 
@@ -70,6 +78,7 @@ def install() -> None:
         (_gui_api.GuiApi, "_handle_gui_updates", update),
         (_gui_api.GuiApi, "_handle_file_transfer_start", start),
         (_gui_api.GuiApi, "_handle_file_transfer_part", part),
+        (_assignable_props_api.AssignablePropsBase, "_cast_value_recursive", _cast),
         (_viser, "ViserTunnel", _NoTunnel),
         (_client_autobuild, "ensure_client_is_built", lambda: None),  # it would call npm
     ]
@@ -132,6 +141,13 @@ def _serve(handler: Callable[[Any], Awaitable[None]], host: str, port: int, **op
 
 def _subprotocol(_connection: Any, offered: Sequence[Any]) -> Any:
     return next((p for p in offered if re.fullmatch(r"viser-v[0-9a-z.+-]{1,24}", p)), None)
+
+
+def _cast(self: Any, hint: Any, value: Any, prop_name: str) -> Any:
+    """viser's, asked only where it may change something: it makes four types to compare with, at every assignment."""
+    if value is None or isinstance(value, str | bool | int | float):
+        return value
+    return _real_cast(self, hint, value, prop_name)
 
 
 class _NoTunnel:

@@ -8,7 +8,6 @@ import viser
 
 from ..actions import unpin, visit
 from ..fields import PINS
-from ..state import ViewState
 from ..text import say
 from .widgets import Change, Widgets
 
@@ -31,7 +30,7 @@ def _build_pin(w: Widgets, number: int) -> None:
     group = w.gui.add_button_group(say("pin.name", number=number + 1), tuple(does), visible=False)
     group.on_click(w.heard(lambda option: does[option](number)))
 
-    def seen(state: ViewState) -> None:
-        group.visible = number < len(state.pins)
+    def seen(here: bool) -> None:
+        group.visible = here
 
-    w.watch(seen)
+    w.watch(lambda state: number < len(state.pins), seen)

@@ -11,7 +11,6 @@ import viser
 from viser._gui_handles import GuiProgressBarHandle
 
 from ..guard import add_upload
-from ..state import ViewState
 from ..text import say
 from .explore import folder
 from .flex import LETTERS
@@ -63,7 +62,7 @@ class Export:
 def build(w: Widgets, does: Does) -> Export:
     """The tab."""
     own = w.gui.add_checkbox(say("export.own"), False, visible=False, hint=say("export.own_hint"))
-    w.watch(lambda state: _offer(own, state))
+    w.watch(lambda state: state.subject == "photo", lambda own_photo: _offer(own, own_photo))
 
     def with_own() -> dict[str, bool]:
         return {"own_photo": True} if own.visible and own.value else {}
@@ -80,8 +79,8 @@ def build(w: Widgets, does: Does) -> Export:
     return Export(words, bar, stop)
 
 
-def _offer(own: viser.GuiCheckboxHandle, state: ViewState) -> None:
-    own.visible = state.subject == "photo"
+def _offer(own: viser.GuiCheckboxHandle, own_photo: bool) -> None:
+    own.visible = own_photo
 
 
 def _build_picture(w: Widgets, does: Does, with_own: Callable[[], dict[str, bool]]) -> None:

@@ -20,6 +20,7 @@ Change = Callable[[ViewState], ViewState]
 Tell = Callable[[Change], None]
 Listener = Callable[[viser.GuiEvent[Any]], Coroutine[Any, Any, None]]
 
+_NOTHING = object()  # equal to no value
 STEPS_PER_OCTAVE = 24.0  # of a distance slider: 2.9 % a step
 MARKS_CM = (20, 30, 60, 120, 240, 500)
 
@@ -31,7 +32,9 @@ class Widgets:
         self.gui = gui
         self._tell, self._act = tell, act
         self._shown: list[tuple[viser.GuiInputHandle[Any], Callable[[ViewState], Any]]] = []
-        self._watchers: list[Callable[[ViewState], None]] = []
+        self._last: list[Any] = []  # what was shown in each, unless a person has changed it since
+        self._watched: list[tuple[Callable[[ViewState], Any], Callable[[Any], None]]] = []
+        self._seen: list[Any] = []  # what each watcher was told
         self._pressed: dict[str, Callable[[ViewState], str]] = {}  # label of a group -> option on
         self._steps: list[str] = []
 
@@ -51,16 +54,23 @@ class Widgets:
 
     def show(self, state: ViewState) -> None:
         """Write a state into the widgets; on the event loop only, so an older value never overwrites a newer one."""
-        for handle, read in self._shown:
+        for index, (handle, read) in enumerate(self._shown):
             value = read(state)
+            if value == self._last[index]:
+                continue
+            self._last[index] = value
             if handle.value != value:  # asked first: viser looks up types at every assignment
                 handle.value = value
-        for watch in self._watchers:
-            watch(state)
+        for index, (read, tell) in enumerate(self._watched):
+            value = read(state)
+            if value != self._seen[index]:
+                self._seen[index] = value
+                tell(value)
 
-    def watch(self, watcher: Callable[[ViewState], None]) -> None:
-        """Call `watcher` with every state that is shown: for what is more than a value, such as what can be seen."""
-        self._watchers.append(watcher)
+    def watch(self, read: Callable[[ViewState], Any], tell: Callable[[Any], None]) -> None:
+        """Call `tell` with `read(state)` whenever that has changed: for what is more than a value of a widget."""
+        self._watched.append((read, tell))
+        self._seen.append(_NOTHING)
 
     def distance(self, name: str) -> None:
         """A slider over the steps of a distance."""
@@ -159,8 +169,15 @@ class Widgets:
         self, handle: viser.GuiInputHandle[Any], read: Callable[[ViewState], Any], write: Callable[[Any], Change]
     ) -> None:  # fmt: skip
         """Let a widget show `read(state)` and say the change `write(value)`."""
-        handle.on_update(self.heard(write))
+        index = len(self._shown)
+
+        def changes(value: Any) -> Change:
+            self._last[index] = _NOTHING
+            return write(value)
+
+        handle.on_update(self.heard(changes))
         self._shown.append((handle, read))
+        self._last.append(_NOTHING)
 
     def heard(self, write: Callable[[Any], Change]) -> Listener:
         """A listener that says what a person did; what show() writes is not heard."""
