@@ -1,9 +1,9 @@
 """Browsers that come and go: `python benchmarks/churn.py [--cycles 500]`, the end of `make bench-page`.
 
-Each cycle connects, has its first picture, changes the assumed distance, and leaves: half of them at once, half when
-the change is drawn; ten at a time. After every tenth of the cycles the server is asked what it holds when all have
-left. Wanted: no slope of memory, descriptors, threads and asyncio tasks over the second half, when what is kept for
-good, such as the fits in store, is there.
+Each cycle connects, has its first picture, changes the assumed distance to one of four values, and leaves: half of
+them at once, half when the change is drawn; ten at a time. After every tenth of the cycles the server is asked what it
+holds when all have left. Wanted: no slope of memory, descriptors, threads and asyncio tasks over the second half, when
+what is kept for good, such as the faces in store, is there.
 """
 
 from __future__ import annotations
@@ -43,12 +43,14 @@ def main() -> None:
     print(f"{cycles} cycles in {time.perf_counter() - start:.0f} s")
 
 
-async def churn(server: Server, cycles: int) -> dict[int, dict[str, int]]:
-    """What the server holds after so many cycles, ten times; at 0 after one browser."""
-    await _cycle(server.address, 0)
+async def churn(server: Server, cycles: int, first: int = 20) -> dict[int, dict[str, int]]:
+    """What the server holds after so many cycles, up to ten times; at 0 after the `first`, which do not count."""
+    await asyncio.gather(*(_cycle(server.address, number) for number in range(first)))
     told = {0: await _left(server)}
     done = 0
-    for until in np.linspace(0, cycles, 11).round().astype(int).tolist()[1:]:
+    for until in (
+        np.linspace(0, cycles, 1 + min(10, cycles // TOGETHER)).round().astype(int).tolist()[1:]
+    ):
         while done < until:
             count = min(TOGETHER, until - done)
             await asyncio.gather(*(_cycle(server.address, done + n) for n in range(count)))
@@ -61,10 +63,8 @@ async def _cycle(address: str, number: int) -> None:
     async with opened(address) as tab:
         before = len(tab.meshes)
         control = tab.controls[SLIDER]
-        low, high = int(control.props["min"]), int(control.props["max"])
-        # By a number without a common factor: neighbours differ, and all values come
-        value = low + 37 * number % (high - low)
-        await tab.set(SLIDER, value + (value == control.value))
+        # Few values: each new one leaves a face in store, half a megabyte, until the store is full
+        await tab.set(SLIDER, int(control.props["max"]) - 1 - 5 * (number % 4))
         if number % 2 and not await tab.until(lambda: len(tab.meshes) > before, PATIENCE):
             raise TimeoutError(f"cycle {number}: no mesh in {PATIENCE:g} s: {tab.lost}")
 

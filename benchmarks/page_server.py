@@ -191,18 +191,18 @@ class Server:
 def running(*, stages: bool = False) -> Iterator[Server]:
     """The page on a free port, ended afterwards. The timers of `stages` cost some microseconds a call."""
     command = [sys.executable, __file__, *(["--stages"] if stages else [])]
-    process = subprocess.Popen(  # noqa: S603 - this file
+    with subprocess.Popen(  # noqa: S603 - this file
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )
-    try:
-        yield Server(process)
-    finally:
-        assert process.stdin is not None
-        process.stdin.close()
+    ) as process:
         try:
-            process.wait(10)
-        except subprocess.TimeoutExpired:
-            process.kill()
+            yield Server(process)
+        finally:
+            assert process.stdin is not None
+            process.stdin.close()
+            try:
+                process.wait(10)
+            except subprocess.TimeoutExpired:
+                process.kill()
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ import re
 import sys
 import threading
 import types
+import warnings
 from collections.abc import Awaitable, Callable, Sequence
 from typing import Any
 
@@ -86,8 +87,13 @@ def install() -> None:
 
 
 def _hush() -> None:
-    """viser prints its banner and farewell through rich.print, even when not verbose."""
+    """viser prints its banner and farewell through rich.print, even when not verbose.
+
+    And it warns when something is sent to a browser that has just gone: a worker may be drawing for it.
+    """
     import rich
+
+    warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
 
     loud = rich.print
 
