@@ -2,19 +2,19 @@
 
 Black box over the websocket, with a server process of its own; tabs here, no browser. For each row so many tabs drag
 the assumed distance at so many values a second: time from every message to the first mesh that shows its value or a
-newer one, CPU a change, bytes, the slowest tab, the last value; what must be zero. Then where the server's time goes in
-a drag, through values nobody has seen (every one is fitted) and again through the same, and the race of two controls.
-"wanted" is for a machine of two cores with nothing else running, the load included; beside other work compare the CPU.
+newer one, CPU of the server a change ("ours": of this process), bytes, meshes of the slowest tab, the last value; what
+must be zero. Then the race of two controls, and where the server's time goes in a drag: through values nobody has seen
+(every one is fitted), and again through the same.
+What stands in brackets is wanted of a machine of two cores with nothing else running, this
+load included; beside other work compare the CPU.
 """
 
 from __future__ import annotations
 
 import argparse
 import asyncio
-import json
 import os
 import random
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -41,6 +41,11 @@ class Bars(NamedTuple):
     end: float | None = None  # ms, 95 %
 
 
+COLUMNS = (  # heading, name in Bars and of a figure, width
+    ("p50 ms", "p50", 13), ("p95 ms", "p95", 13), ("last p95 ms", "end", 14), ("Mbit/s", "mbit", 13),
+    ("slowest/s", "slowest", 12), ("CPU ms a change", "cpu", 17), ("ours", "own cpu", 7), ("kB", "kB", 7),
+    ("lost", "lost", 6), ("wrong", "wrong", 6), ("shared", "shared", 7), ("backward", "backward", 9),
+)  # fmt: skip
 ROWS = (
     Bars(1, 20, p50=12, p95=30),
     Bars(10, 10, p95=50),
@@ -50,38 +55,39 @@ ROWS = (
 
 
 def main() -> None:
-    """Print the tables."""
+    """Print the tables, each line when it is known."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--quick", action="store_true", help="one short drag a row, few rounds")
-    arguments.add_argument("--json", action="store_true", help="the rows as JSON")
-    options = arguments.parse_args()
-    drags, rounds = (1, 3) if options.quick else (4, 20)
-    with running() as server:
-        rows, bars = asyncio.run(_rows(server, drags)), ROWS
-        wrong = asyncio.run(race(server.address, rounds))
-    with running(stages=True) as server:
-        stages = asyncio.run(_stages(server))
-    if options.json:
-        figures = [_figures(row) for row in rows]
-        print(json.dumps({"about": about(), "rows": figures, "race": wrong, "stages": stages}))
-        return
+    drags, rounds = (1, 3) if arguments.parse_args().quick else (4, 20)
     print(", ".join(f"{name} {value}" for name, value in about().items()))
-    _show(rows, bars)
-    _show_sizes(rows)
-    _show_stages(stages)
-    print(f"race of two controls, {PAIRS} tabs x {rounds} rounds: {len(wrong)} wrong")
+    with running() as server:
+        asyncio.run(_rows(server, drags))
+        wrong = asyncio.run(race(server.address, rounds))
+    print(f"race of two controls, {PAIRS} tabs x {rounds} rounds: {len(wrong)} wrong", flush=True)
     for words in wrong:
         print(f"  {words}")
+    with running(stages=True) as server:
+        _show_stages(asyncio.run(_stages(server)))
 
 
-async def _rows(server: Server, drags: int) -> list[Row]:
+async def _rows(server: Server, drags: int) -> None:
     book = await page_load.learn(server.address)
-    return [
-        await page_load.row(
+    print(" tabs @ Hz" + "".join(f"{words:>{width}}" for words, _, width in COLUMNS), flush=True)
+    first = None
+    for bars in ROWS:
+        row = await page_load.row(
             server.address, book, bars.clients, bars.hertz, drags, server.cpu_seconds
         )
-        for bars in ROWS
-    ]
+        told, wanted = _figures(row), bars._asdict()
+        line = f"{row.clients:>5} @ {row.hertz:<2g}"
+        for _, name, width in COLUMNS:
+            bar = wanted.get(name)
+            sign = ">=" if name == "slowest" else "<"
+            line += f"{told[name]:.4g}{'' if bar is None else f' ({sign}{bar:g})'}".rjust(width)
+        print(line, flush=True)
+        first = first or row
+    if first is not None:
+        _show_sizes(first)
 
 
 async def _stages(server: Server) -> dict[str, dict[str, Any]]:
@@ -108,8 +114,6 @@ def _figures(row: Row) -> dict[str, float]:
     """Milliseconds unless the name says otherwise."""
     lags, ends = 1e3 * np.array(row.told.lags), 1e3 * np.array(row.told.ends)
     return {
-        "clients": row.clients,
-        "hertz": row.hertz,
         "p50": float(np.percentile(lags, 50)),
         "p95": float(np.percentile(lags, 95)),
         "end": float(np.percentile(ends, 95)),
@@ -125,32 +129,8 @@ def _figures(row: Row) -> dict[str, float]:
     }
 
 
-def _show(rows: list[Row], bars: tuple[Bars, ...]) -> None:
-    print("tabs @ Hz      p50 ms      p95 ms   last p95 ms    Mbit/s   slowest/s   CPU ms a change "
-          "(ours)   kB   lost wrong shared backward")  # fmt: skip
-    for row, wanted in zip(rows, bars, strict=True):
-        told = _figures(row)
-
-        def cell(
-            name: str, width: int, bar: Callable[[Bars], float | None], low: bool = False
-        ) -> str:
-            most = bar(wanted)  # noqa: B023 - called in the same round
-            said = "" if most is None else f" ({'>=' if low else '<'}{most:g})"
-            return f"{told[name]:.1f}{said}".rjust(width)  # noqa: B023
-
-        print(
-            f"{row.clients:>4} @ {row.hertz:<3g}"
-            + cell("p50", 12, lambda b: b.p50) + cell("p95", 14, lambda b: b.p95)
-            + cell("end", 14, lambda b: b.end) + cell("mbit", 14, lambda b: b.mbit)
-            + cell("slowest", 12, lambda b: b.slowest, low=True)
-            + f"{told['cpu']:>12.2f} ({told['own cpu']:.2f}){told['kB']:>10.1f}"
-            + "".join(f"{told[name]:>7g}" for name in ("lost", "wrong", "shared", "backward"))
-        )  # fmt: skip
-
-
-def _show_sizes(rows: list[Row]) -> None:
-    print("bytes a change, by kind of message:")
-    row = rows[0]
+def _show_sizes(row: Row) -> None:
+    print(f"bytes a change, by kind of message, {row.clients} @ {row.hertz:g}:")
     for kind, size in row.sizes.most_common():
         print(f"  {kind:<44}{size / row.sent:>10.0f}")
     print(f"  {'all':<44}{sum(row.sizes.values()) / row.sent:>10.0f}   {row.meshes} meshes, "

@@ -162,8 +162,10 @@ async def drag(tab: Tab, book: Book, hertz: float, rng: random.Random) -> Drag:
         taken.sent.append(Sent(await tab.set(SLIDER, book.values[value]), value))
     last, since = taken.sent[-1], time.perf_counter()
 
-    def answered() -> bool:
-        return len(tab.meshes) > before and book.value(tab.meshes[-1]) == last.value
+    def answered() -> bool:  # in full: else the mesh of this rest would come into the next drag
+        came = (m for m in reversed(tab.meshes[before:]) if m.n_vertices == max(book.known))
+        full = next(came, None)
+        return full is not None and book.value(full) == last.value
 
     while await tab.until(answered, PATIENCE - (time.perf_counter() - since)):
         await tab.quiet(QUIET, PATIENCE)
