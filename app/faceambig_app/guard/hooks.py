@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import logging
 import re
@@ -16,6 +17,7 @@ import viser
 import websockets.asyncio.server
 from viser import _client_autobuild, _gui_api, _gui_handles, _scene_api, _viser
 from viser.infra import _infra
+from viser.infra._async_message_buffer import AsyncMessageBuffer
 
 from .door import DOOR, VISER, Door, ServeError, log_line
 from .messages import MAX_MESSAGE, consume, dispatch
@@ -67,6 +69,7 @@ def install() -> None:
     hooks: list[tuple[Any, str, Any]] = [
         (_infra, "websockets", doors),
         (_infra, "_message_consumer", consume),
+        (AsyncMessageBuffer, "__init__", _buffer),
         (_infra.WebsockMessageHandler, "_handle_incoming_message", dispatch),
         (_gui_api.GuiApi, "_handle_gui_updates", update),
         (_gui_api.GuiApi, "_handle_file_transfer_start", start),
@@ -84,6 +87,31 @@ def install() -> None:
         setattr(owner, name, ours)
     _hush()
     _installed = True
+
+
+class NewsEvent(asyncio.Event):
+    """Set by any thread: off the loop it is a mark and wakes nobody, for viser sets it once more on the loop.
+
+    A plain one goes through those who wait, while the loop takes them in and out: "deque mutated during iteration", and
+    the frame that a worker was sending is lost.
+    """
+
+    def set(self) -> None:
+        try:
+            asyncio.get_running_loop()
+        except RuntimeError:
+            self._value = True
+            return
+        self._value = False  # it may be marked, with somebody waiting
+        super().set()
+
+
+_real_buffer = AsyncMessageBuffer.__init__
+
+
+def _buffer(self: AsyncMessageBuffer, *arguments: Any, **options: Any) -> None:
+    _real_buffer(self, *arguments, **options)
+    self.message_event = NewsEvent()
 
 
 def _hush() -> None:
