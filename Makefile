@@ -15,7 +15,7 @@ LOCKED = $(INSTALL) --no-deps --require-hashes -r
 export OPENBLAS_NUM_THREADS = 1
 export OMP_NUM_THREADS = 1
 
-.PHONY: demo test check fix bench golden lock head clean for-demo for-test
+.PHONY: demo test check fix bench bench-page golden lock head clean for-demo for-test
 .NOTPARALLEL:
 
 demo: for-demo .venv/.app
@@ -37,6 +37,10 @@ fix: .venv/.dev
 bench: .venv/.dev
 	@for name in fit budget derivative growth contours flex extremes against_eos load detect; do \
 		echo "== benchmarks/$$name.py"; .venv/bin/python benchmarks/$$name.py || exit 1; done
+
+# Minutes, and both cores: nothing else may run beside it.
+bench-page: .venv/.dev
+	@for name in page churn; do echo "== benchmarks/$$name.py"; .venv/bin/python benchmarks/$$name.py || exit 1; done
 
 # Stores the pictures of the tests anew: look at each one that changed before it is committed.
 golden: for-test .venv/.dev

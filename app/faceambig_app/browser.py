@@ -25,7 +25,7 @@ from .orders import Orders
 from .own_room import OwnRoom
 from .panel import Change, Panel
 from .panel.widgets import setting
-from .room import Dispatcher, Room
+from .room import REST, Dispatcher, Room
 from .saving import Saving
 from .script import (
     Click,
@@ -265,6 +265,9 @@ class Browser:
         """Say why a state could not be drawn; the last good frame stays."""
         log.warning("a frame failed: %s", " ".join(str(error).split())[:200])
         self.notice(say("error.failed", cause=str(error)))
+        self._loop.call_soon_threadsafe(
+            self._loop.call_later, REST, self._say_again, self.room.state
+        )
 
     def draw(self, state: ViewState, draft: bool) -> None:
         """Compute a state and send it; called by one worker at a time."""
@@ -279,5 +282,10 @@ class Browser:
             self._show_own()
             self.script.address(query(drawn))
             self.panel.flex.tell(rest.sliders)
-            self.panel.show(drawn)
+            self._say_again(drawn)
+
+    def _say_again(self, state: ViewState) -> None:
+        """The controls of a state at rest, those that nothing has changed too; of one that cannot be drawn as well."""
+        if not self.room.left and self.room.state == state:
+            self.panel.show(state)
             guard.restate(self._client, self.panel.controls)

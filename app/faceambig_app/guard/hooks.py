@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import logging
 import re
 import sys
 import threading
 import types
+import warnings
 from collections.abc import Awaitable, Callable, Sequence
 from typing import Any
 
@@ -22,6 +24,7 @@ from viser import (
     _viser,
 )
 from viser.infra import _infra
+from viser.infra._async_message_buffer import AsyncMessageBuffer
 
 from .door import DOOR, VISER, Door, ServeError, log_line
 from .messages import MAX_MESSAGE, consume, dispatch
@@ -74,6 +77,7 @@ def install() -> None:
     hooks: list[tuple[Any, str, Any]] = [
         (_infra, "websockets", doors),
         (_infra, "_message_consumer", consume),
+        (AsyncMessageBuffer, "__init__", _buffer),
         (_infra.WebsockMessageHandler, "_handle_incoming_message", dispatch),
         (_gui_api.GuiApi, "_handle_gui_updates", update),
         (_gui_api.GuiApi, "_handle_file_transfer_start", start),
@@ -94,9 +98,39 @@ def install() -> None:
     _installed = True
 
 
+class NewsEvent(asyncio.Event):
+    """Set by any thread: off the loop it is a mark and wakes nobody, for viser sets it once more on the loop.
+
+    A plain one goes through those who wait, while the loop takes them in and out: "deque mutated during iteration", and
+    the frame that a worker was sending is lost.
+    """
+
+    def set(self) -> None:
+        try:
+            asyncio.get_running_loop()
+        except RuntimeError:
+            self._value = True
+            return
+        self._value = False  # it may be marked, with somebody waiting
+        super().set()
+
+
+_real_buffer = AsyncMessageBuffer.__init__
+
+
+def _buffer(self: AsyncMessageBuffer, *arguments: Any, **options: Any) -> None:
+    _real_buffer(self, *arguments, **options)
+    self.message_event = NewsEvent()
+
+
 def _hush() -> None:
-    """viser prints its banner and farewell through rich.print, even when not verbose."""
+    """viser prints its banner and farewell through rich.print, even when not verbose.
+
+    And it warns when something is sent to a browser that has just gone: a worker may be drawing for it.
+    """
     import rich
+
+    warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
 
     loud = rich.print
 
