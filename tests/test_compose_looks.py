@@ -150,18 +150,30 @@ def test_a_difference_colours_the_fitted_head_by_it_or_by_its_depth():
 
 def test_in_an_overlay_both_faces_are_in_one_place_and_fade_says_how_much_of_which():
     amounts = {}
-    for fade in (0.0, 0.2, 0.5, 0.8, 1.0):
+    for fade in (0.0, 0.3, 0.75, 0.9, 1.0):
         scene = composed(show="overlay", fade=fade)
         assert {head.slot for head in scene.heads} == {0.0}
         amounts[fade] = {head.name: round(head.opacity, 9) for head in scene.heads}
         assert not scene.blink
     assert amounts == {
         0.0: {"fit": 1.0},
-        0.2: {"true": 0.2, "fit": 1.0},
-        0.5: {"true": 0.5, "fit": 1.0},
-        0.8: {"true": 0.8, "fit": 0.4},
+        0.3: {"true": 0.4, "fit": 1.0},
+        0.75: {"true": 1.0, "fit": 1.0},
+        0.9: {"true": 1.0, "fit": 0.4},
         1.0: {"true": 1.0},
     }
+
+
+def test_at_every_fade_one_face_of_an_overlay_is_solid_and_neither_jumps():
+    fades = np.linspace(0, 1, 81)
+    opacity = {"true": np.zeros(81), "fit": np.zeros(81)}
+    for at, fade in enumerate(fades):
+        for head in composed(show="overlay", fade=float(fade)).heads:
+            opacity[head.name][at] = head.opacity
+    assert (np.maximum(opacity["true"], opacity["fit"]) == 1).all()
+    assert (np.diff(opacity["true"]) >= 0).all() and (np.diff(opacity["fit"]) <= 0).all()
+    steps = np.abs(np.diff([opacity["true"], opacity["fit"]]))
+    assert steps.max() < 0.06  # a step of 1/80 of the slider, of a quarter of it that shows
 
 
 def test_blinking_heads_are_whole_and_in_one_place():

@@ -94,6 +94,7 @@ SHOWS = ("both", "overlay", "blink", "difference")
 HIDEABLE = ("numbers", "truth", "actual")
 ERROR_SCALES = (1.0, 5.0, 10.0, 20.0)
 GHOST_OPACITY = 0.45
+FADED_IN = 0.75  # fade at which the true face is solid over the fitted one, which then goes
 MARGIN = 0.02  # metres between a drawn camera and the edge of the picture
 
 
@@ -139,8 +140,8 @@ def compose(
     titles: above the true head and above the fitted one.
     view: a key of VIEWS; "free" at `orbit` (azimuth, elevation), degrees; or "camera": the photograph itself.
     zoom: 0.5 to 4; the bar of 50 mm keeps 50 mm.
-    show: "both" side by side; "overlay", both in one place, `fade` 0 the fitted face, 1 the true one; "blink", both in
-        one place, in turn; "difference", side by side, the fitted head coloured by it.
+    show: "both" side by side; "overlay", both in one place, `fade` 0 the fitted face, 1 the true one, one of them
+        always solid; "blink", both in one place, in turn; "difference", side by side, the fitted head coloured by it.
     surface: "skin" or "clay"; or of the fitted head "difference" (d_S per vertex, mm), "depth" (`depth_change_mm`) or
         "spread" (`spread_mm` (N,), posterior sd). `shown_surface` says which is drawn, for `legend_words`: title, note.
     overlays: of OVERLAYS; "points" are those on the photograph, "marks" the same on the heads. The ghost is left out
@@ -245,9 +246,9 @@ def _heads(
     true = head(model, "true", titles[0], subject.vertices, own, slot=left)
     fit = head(model, "fit", titles[1], face.vertices, colours, slot=right, lit=not valued)
     if look.show == "overlay":
-        # Up to the middle the fitted face is whole, from there on it fades: one of the two always covers
-        true = replace(true, opacity=look.fade)
-        fit = replace(fit, opacity=min(1.0, 2.0 * (1.0 - look.fade)))
+        # The true face comes over the whole fitted one, which goes when that is whole: one of the two is always solid
+        true = replace(true, opacity=min(1.0, look.fade / FADED_IN))
+        fit = replace(fit, opacity=min(1.0, (1.0 - look.fade) / (1.0 - FADED_IN)))
         return tuple(shown for shown in (true, fit) if shown.opacity > 0)
     if look.show == "both" and "ghost" in look.overlays and not valued and look.view != "camera":
         ghost = head(
