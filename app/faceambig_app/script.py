@@ -16,13 +16,16 @@ from .guard import add_reports, data_html, log_line
 Theme = Literal["auto", "light", "dark"]
 _Pixel = Annotated[float, Meta(ge=0, le=65_536)]
 _Index = Annotated[int, Meta(ge=0, le=9_999)]
+LONGEST = 7_000  # characters of a query: five pins with long names; a request of more than 8 kB is refused
 _QUERY = re.compile(r"[A-Za-z0-9._,:;=&~*+%-]*")  # what no browser writes otherwise
 
 
 class Hello(Struct, frozen=True):
     """The first report of every connection: the address holds the state after a reconnection or a restart."""
 
-    query: Annotated[str, Meta(max_length=2_000)]  # of the address, without "?", as it stands there
+    query: Annotated[
+        str, Meta(max_length=LONGEST)
+    ]  # of the address, without "?", as it stands there
     reduced_motion: bool
     touch: bool
     dark: bool  # the system's preference
@@ -131,9 +134,9 @@ class Script:
 
     def address(self, query: str) -> None:
         """What the address bar shows after "/?"; viser's own harmless keys stay. No new entry of the history."""
-        if not _QUERY.fullmatch(query) or len(query) > 2_000:
+        if not _QUERY.fullmatch(query) or len(query) > LONGEST:
             raise ValueError(
-                f"query {query[:40]!r}: at most 2000 letters, digits and ._,:;=&~*+%-, the rest escaped"
+                f"query {query[:40]!r}: at most {LONGEST} letters, digits and ._,:;=&~*+%-, the rest escaped"
             )
         self._send("address", {"query": query})
 

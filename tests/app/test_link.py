@@ -117,6 +117,17 @@ def test_what_means_the_same_is_one_text():
 
 # Each: a link, what it gives, what is said
 WRONG: dict[str, tuple[str, dict[str, Any], list[str]]] = {
+    "left out by the server": (
+        "subject=4&ignored=spin,lens",
+        {"subject": 4},
+        ["Unknown settings in this link were left out: spin, lens."],
+    ),
+    "left out of a newer one": (
+        "v=2&ignored=spin",
+        {},
+        ["This link was made by a newer version. Unknown settings were left out: spin."],
+    ),
+    "no word of a server's": ("ignored=<b>&subject=4", {"subject": 4}, []),
     "unknown": ("spin=3&subject=4", {"subject": 4}, ["Unknown settings in this link were left out: spin."]),
     "unknown, many": (
         "&".join(f"k{i}=1" for i in range(8)), {},

@@ -12,6 +12,7 @@ import viser
 
 from faceambig_app import script
 from faceambig_app.script import (
+    LONGEST,
     Click,
     Copied,
     Dark,
@@ -123,7 +124,7 @@ def test_one_line_for_nonsense_and_the_rest_is_heard(caplog: pytest.LogCaptureFi
     [
         ("address", "a b", "query 'a b'"),
         ("address", "a#b", "query 'a#b'"),
-        ("address", "a" * 2001, "at most 2000"),
+        ("address", "a" * (LONGEST + 1), f"at most {LONGEST}"),
         ("theme", "blue", "theme 'blue': auto, light or dark"),
     ],
 )
