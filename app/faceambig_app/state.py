@@ -14,7 +14,7 @@ from .fields import FIELDS, PINS, Field, canonical
 
 __all__ = [
     "DEFAULT", "FIELDS", "VERSION", "Bend", "Field", "Fitting", "Look", "Target", "ViewState",
-    "changed", "short",
+    "changed", "names_of_pins", "short",
 ]  # fmt: skip
 
 VERSION = 1  # of the format of links and files
@@ -109,6 +109,7 @@ class ViewState(
     fade: float = 0.5
     hide: tuple[str, ...] = ()
     pins: tuple[ViewState, ...] = ()  # each as short() makes it, of this state's model
+    pin_names: tuple[str, ...] = ()  # of the pins in their order; "" or missing: by its number
     theme: str = "auto"
     text: float = 1.0
 
@@ -121,6 +122,8 @@ class ViewState(
             value = canonical(field, getattr(self, name))
             if field.kind == "pins" and value:
                 value = _pinned(value, self.model)
+            if name == "pin_names":  # after the pins; a name without a pin means nothing
+                value = canonical(field, value[: len(self.pins)])
             # The one place where a state is written to: it is being made
             msgspec.structs.force_setattr(self, name, value)
         if self.view == "free" and self.orbit is None:
@@ -158,6 +161,11 @@ _NOT_OF_A_FACE = tuple(name for name in FIELDS if name not in _OF_A_FACE)
 def short(state: ViewState) -> ViewState:
     """The state of a face alone, as it is pinned: target, fitting and bend; the look and the pins as by default."""
     return ViewState(**{name: getattr(state, name) for name in _OF_A_FACE})
+
+
+def names_of_pins(state: ViewState) -> tuple[str, ...]:
+    """The name of every pin; "" of one that has none."""
+    return state.pin_names + ("",) * (len(state.pins) - len(state.pin_names))
 
 
 def _pinned(pins: tuple[Any, ...], model: str) -> tuple[ViewState, ...]:

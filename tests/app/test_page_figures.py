@@ -302,7 +302,7 @@ def test_the_spectrum_has_a_bar_a_mode_in_proportion():
 def test_the_matrix_of_pins_is_a_table_with_heads_on_both_sides():
     d_s = np.array([[0.0, 2.1], [2.1, 0.0]])
     tree = parsed(figures.pin_matrix(("30 cm", HOSTILE), d_s))
-    rows = [[(cell.text or "") for cell in row] for row in tree.iter("tr")]
+    rows = [["".join(cell.itertext()) for cell in row] for row in tree.iter("tr")]
     assert rows == [["", "30 cm", HOSTILE], ["30 cm", "", "2.1"], [HOSTILE, "2.1", ""]]
     assert [th.attrib["scope"] for th in tree.iter("th")] == ["col", "col", "row", "row"]
 

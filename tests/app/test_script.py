@@ -77,7 +77,7 @@ def test_reports_are_read(sent: object, read: script.Report) -> None:
         '{"click": {"x": -1, "y": 1}}',
         '{"click": {"x": "1", "y": 1}}',
         '{"point": {"index": 1.5, "x": 1, "y": 1, "done": true}}',
-        json.dumps({"hello": HELLO | {"query": "x" * 2001}}),
+        json.dumps({"hello": HELLO | {"query": "x" * (LONGEST + 1)}}),
         json.dumps({"hello": HELLO | {"theme": "blue"}}),
         json.dumps({"hello": HELLO | {"text": 3}}),
         "[" * 4000,
