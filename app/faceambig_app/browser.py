@@ -83,6 +83,7 @@ class Browser:
         self._saving = Saving(
             client, loop, orders, now=lambda: self.room.state, go=self._opened,
             show=lambda shown: self.panel.export.show(shown), notice=self.notice,
+            own=lambda: self._own.photo,
         )  # fmt: skip
         self.panel = Panel(
             client.gui, people, self.change, self.act, narrow=self.stage.narrow,
