@@ -75,6 +75,7 @@ class HeadNodes:
         # Directly below the root, where both meshes stand: the first of the fine vertices are the coarse ones
         self._colours = add_colours(scene, root, shaded(head))
         self._painted: object = head.colours
+        self._values = head.values_mm
         self._offset = 0.0  # metres along the viewer's right
         self._wanted: Board | None = Board(head.title, 0.0, (), 0.0)  # no scene's
         self._placed: object = (
@@ -87,6 +88,7 @@ class HeadNodes:
 
     def show(self, points: NDArray[np.float64], head: Head, draft: bool) -> None:
         """Send what changed of the head at `points` (V, 3), metres; equal arrays send nothing."""
+        self._values = head.values_mm
         draft = draft and self._coarse is not None
         vertices, seen = points.astype(np.float32), head.opacity > 0
         opacity = head.opacity if head.opacity < 1 else None  # None: sorted as a solid
@@ -101,6 +103,11 @@ class HeadNodes:
         if head.colours is not self._painted:
             self._painted = head.colours
             self._colours.colors = shaded(head)
+
+    def value(self, vertex: int) -> float | None:
+        """Millimetres that the colour of a vertex means, NaN where nothing is measured; None where it means none."""
+        values = self._values
+        return None if values is None or vertex >= len(values) else float(values[vertex])
 
     def write(self, board: Board | None) -> None:
         """The words above and below; None where another head of the slot, or nothing, has them."""

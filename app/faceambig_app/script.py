@@ -78,7 +78,15 @@ class Copied(Struct, frozen=True):
     ok: bool
 
 
-Report = Hello | Point | Click | Gone | Key | Hand | Dark | Copied
+class Probe(Struct, frozen=True):
+    """The pointer is over a vertex of a head. n counts the questions; the answer is `Script.probed`."""
+
+    n: Annotated[int, Meta(ge=1)]
+    head: Annotated[str, Meta(max_length=64)]
+    vertex: Annotated[int, Meta(ge=0, le=9_999_999)]
+
+
+Report = Hello | Point | Click | Gone | Key | Hand | Dark | Copied | Probe
 
 
 class _Envelope(Struct, frozen=True, forbid_unknown_fields=True):
@@ -92,6 +100,7 @@ class _Envelope(Struct, frozen=True, forbid_unknown_fields=True):
     hand: bool | UnsetType = UNSET
     dark: bool | UnsetType = UNSET
     copied: Copied | UnsetType = UNSET
+    probe: Probe | UnsetType = UNSET
 
 
 _decoder = msgspec.json.Decoder(_Envelope)
@@ -178,6 +187,14 @@ class Script:
     def keys(self, on: bool) -> None:
         """Whether single keys are shortcuts; those with Ctrl, Alt or Meta always are."""
         self._send("keys", {"on": on})
+
+    def probe(self, on: bool) -> None:
+        """Whether the colours of a head are numbers: only then the page asks what is under the pointer."""
+        self._send("probe", {"on": on})
+
+    def probed(self, n: int, text: str) -> None:
+        """The answer to question n of `Probe`, shown where it was asked; "": what is shown holds no more."""
+        self._send("probed", {"n": n, "text": text})
 
     def words(self, words: dict[str, str]) -> None:
         """Section "page" of another language."""

@@ -24,6 +24,7 @@ from .colours import (
     difference_colours,
     difference_legend,
     greyed,
+    over_region,
     plain,
     scale_colours,
     shown_surface,
@@ -159,6 +160,8 @@ def compose(
     look = _asked(view, show, surface, overlays, hide, fade, true_camera)
     colours = _colours(subject, face, look, spread_mm)
     heads = _heads(subject, face, look, titles, colours)
+    if (values := _values(subject, face, look, spread_mm)) is not None:
+        heads = tuple(replace(one, values_mm=values) if one.name == "fit" else one for one in heads)
     lines = () if view == "camera" else tuple(_lines(subject, face, look, picture))
     told = curve
     if curve is not None and "actual" in look.hide:
@@ -232,6 +235,15 @@ def _colours(subject: Subject, face: Face, look: Look, spread_mm: Array | None) 
         return spread_colours(model, spread_mm)
     colours = plain(model, CLAY) if look.surface == "clay" else skin(subject)
     return colours if face.plausible else greyed(colours)
+
+
+def _values(subject: Subject, face: Face, look: Look, spread_mm: Array | None) -> Array | None:
+    """(N,) millimetres that the colours of the fitted head mean; None where they mean none."""
+    if look.surface == "difference":
+        return over_region(subject.model, face.gaps_mm)
+    if look.surface == "depth" and look.true_camera is not None:
+        return over_region(subject.model, depth_change_mm(subject, face, look.true_camera))
+    return spread_mm if look.surface == "spread" else None
 
 
 def _heads(

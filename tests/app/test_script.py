@@ -21,6 +21,7 @@ from faceambig_app.script import (
     Hello,
     Key,
     Point,
+    Probe,
     is_dark,
     read_report,
 )
@@ -49,6 +50,7 @@ HELLO = {
         ({"hand": True}, Hand(True)),
         ({"dark": True}, Dark(True)),
         ({"copied": {"n": 2, "ok": False}}, Copied(2, False)),
+        ({"probe": {"n": 3, "head": "fit", "vertex": 77}}, Probe(3, "fit", 77)),
     ],
 )
 def test_reports_are_read(sent: object, read: script.Report) -> None:
@@ -70,6 +72,10 @@ def test_reports_are_read(sent: object, read: script.Report) -> None:
         '{"gone": 1, "dark": true}',
         '{"other": 1}',
         '{"key": "Enter"}',
+        '{"probe": {"n": 0, "head": "fit", "vertex": 1}}',
+        '{"probe": {"n": 1, "head": "fit", "vertex": -1}}',
+        '{"probe": {"n": 1, "head": "' + "x" * 65 + '", "vertex": 1}}',
+        '{"probe": {"n": 1, "head": 1, "vertex": 1}}',
         '{"dark": 1}',
         '{"click": {"x": 1}}',
         '{"click": {"x": NaN, "y": 1}}',
