@@ -52,7 +52,7 @@ function under(x, y) {
   let best = null;
   for (const [name, group] of Object.entries(nodeRefFromName)) {
     const head = HEADS.exec(name)?.[1];
-    if (!head || !isSeen(group)) continue;
+    if (!head || !group || !isSeen(group)) continue; // null: a node that has gone
     const mesh = meshOf(group);
     if (!mesh || mesh.material.opacity < SOLID) continue;
     const back = mesh.matrixWorld.clone().invert();
