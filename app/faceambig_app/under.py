@@ -33,7 +33,7 @@ def words(state: ViewState, mm: float | None) -> str:
         case "depth":
             if size == f"0.0{NARROW}mm":
                 return say("under.level", mm=size)
-            return say("under.nearer" if mm > 0 else "under.farther", mm=size)
+            return say("under.nearer", mm=size) if mm > 0 else say("under.farther", mm=size)
         case "spread":
             return say("under.spread", mm=size)
         case _ if state.subject == "photo":
