@@ -5,6 +5,7 @@
 const LINGER = 150; // milliseconds a mouse rests
 const TAP = 10; // pixels of the page within which a finger's press is a tap
 const HEADS = /^\/([^/]+)\/(head|draft)$/;
+const REACH = 100; // metres: beyond everything
 const SOLID = 0.5; // opacity from which a head is what is pointed at
 const tag = document.createElement("div");
 tag.className = "fa-under";
@@ -48,7 +49,9 @@ function under(x, y) {
   const { camera, canvas, nodeRefFromName } = window.__viserMutable;
   const box = canvas.getBoundingClientRect();
   const at = [(2 * (x - box.left)) / box.width - 1, 1 - (2 * (y - box.top)) / box.height];
-  const [near, far] = [-1, 1].map((depth) => camera.position.clone().set(...at, depth).unproject(camera));
+  // From the eye through a place in front of it: which depth is near and which far, viser's renderer turns round
+  const near = camera.position.clone();
+  const far = camera.position.clone().set(...at, 0.5).unproject(camera).sub(near).setLength(REACH).add(near);
   let best = null;
   for (const [name, group] of Object.entries(nodeRefFromName)) {
     const head = HEADS.exec(name)?.[1];
