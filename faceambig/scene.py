@@ -36,6 +36,7 @@ class Head:
     coarse_faces: NDArray[np.uint32] | None = (
         None  # over the first vertices: the mesh while a hand moves
     )
+    values_mm: Array | None = None  # (V,) what colours of a legend mean; NaN: not measured
     opacity: float = 1.0  # below 1: a ghost; of heads in one slot the nearer surface covers the farther by this share
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import unicodedata
 from collections.abc import Iterator
 from functools import cache
 from typing import Any
@@ -12,6 +13,27 @@ from hypothesis import strategies as st
 from faceambig_app.state import FIELDS, Field, ViewState, changed
 
 SAFE = st.text("abcdefghijklmnopqrstuvwxyz0123456789_", min_size=1, max_size=12)
+# Of any script, with every sign that means something in an address, a file or a shell
+TURNING = ("LRE", "RLE", "LRO", "RLO", "PDF", "LRI", "RLI", "FSI", "PDI")
+NAMES = st.sampled_from(
+    [
+        "",
+        "none",
+        "a, b",
+        "50%2C",
+        "..",
+        "default",
+        "<b>&\"'",
+        "-x",
+        "N\u00e4he \u05d0",
+        "\U0001f600",
+    ]
+) | st.text(
+    st.characters(exclude_categories=("Cc", "Cs")).filter(
+        lambda c: unicodedata.bidirectional(c) not in TURNING
+    ),
+    max_size=30,
+)
 
 
 def numbers(low: float, high: float) -> st.SearchStrategy[float]:
@@ -46,6 +68,8 @@ def values(field: Field) -> st.SearchStrategy[Any]:
             return st.none() | st.tuples(st.floats(-400, 400), numbers(-90, 90))
         case "pins":
             return st.just(())
+        case "words":
+            return st.lists(NAMES, max_size=5)
 
 
 def made(chosen: dict[str, Any]) -> ViewState:
@@ -70,7 +94,7 @@ def alone(draw: st.DrawFn, most: int = 8) -> ViewState:
 def states(draw: st.DrawFn) -> ViewState:
     """States, some with pins."""
     pins = draw(st.lists(alone(4), max_size=draw(st.sampled_from([0, 0, 1, 5]))))
-    return changed(draw(alone()), pins=pins)
+    return changed(draw(alone()), pins=pins, pin_names=draw(values(FIELDS["pin_names"])))
 
 
 def random_states(number: int, seed: int) -> Iterator[ViewState]:
@@ -78,7 +102,10 @@ def random_states(number: int, seed: int) -> Iterator[ViewState]:
     rng = random.Random(seed)
     for _ in range(number):
         pins = [_random(rng, rng.random()) for _ in range(rng.choice((0, 0, 1, 2, 5)))]
-        yield changed(_random(rng, rng.random()), pins=pins)
+        names = [
+            rng.choice(("", "none", "Near", "a, b", "50%2C", "\U0001f600 \u05d0")) for _ in pins
+        ]
+        yield changed(_random(rng, rng.random()), pins=pins, pin_names=names)
 
 
 def _random(rng: random.Random, share: float) -> ViewState:
@@ -107,5 +134,5 @@ def _random_value(rng: random.Random, field: Field) -> Any:
             ]
         case "orbit":
             return rng.uniform(-400, 400), rng.uniform(low, high)
-        case "pins":
+        case "pins" | "words":
             return ()

@@ -150,18 +150,43 @@ def test_a_difference_colours_the_fitted_head_by_it_or_by_its_depth():
 
 def test_in_an_overlay_both_faces_are_in_one_place_and_fade_says_how_much_of_which():
     amounts = {}
-    for fade in (0.0, 0.2, 0.5, 0.8, 1.0):
+    for fade in (0.0, 0.3, 0.75, 0.9, 1.0):
         scene = composed(show="overlay", fade=fade)
         assert {head.slot for head in scene.heads} == {0.0}
         amounts[fade] = {head.name: round(head.opacity, 9) for head in scene.heads}
         assert not scene.blink
     assert amounts == {
         0.0: {"fit": 1.0},
-        0.2: {"true": 0.2, "fit": 1.0},
-        0.5: {"true": 0.5, "fit": 1.0},
-        0.8: {"true": 0.8, "fit": 0.4},
+        0.3: {"true": 0.4, "fit": 1.0},
+        0.75: {"true": 1.0, "fit": 1.0},
+        0.9: {"true": 1.0, "fit": 0.4},
         1.0: {"true": 1.0},
     }
+
+
+def test_at_every_fade_one_face_of_an_overlay_is_solid_and_neither_jumps():
+    fades = np.linspace(0, 1, 81)
+    opacity = {"true": np.zeros(81), "fit": np.zeros(81)}
+    for at, fade in enumerate(fades):
+        for head in composed(show="overlay", fade=float(fade)).heads:
+            opacity[head.name][at] = head.opacity
+    assert (np.maximum(opacity["true"], opacity["fit"]) == 1).all()
+    assert (np.diff(opacity["true"]) >= 0).all()
+    assert (np.diff(opacity["fit"]) <= 0).all()
+    steps = np.abs(np.diff([opacity["true"], opacity["fit"]]))
+    assert steps.max() < 0.06  # the steeper ramp: 0 to 1 over a quarter of 80 steps
+
+
+def test_the_fitted_head_carries_the_millimetres_that_its_colours_mean():
+    for surface, colours in (("difference", fc.difference_colours), ("depth", fc.depth_colours)):
+        fit = composed(surface=surface).heads[1]
+        region = MODEL.evaluation if MODEL.evaluation is not None else np.arange(MODEL.n_vertices)
+        assert np.isfinite(fit.values_mm[region]).all()
+        assert np.isnan(np.delete(fit.values_mm, region)).all()
+        assert np.array_equal(colours(MODEL, fit.values_mm[region]), fit.colours)
+    assert np.nanmin(fit.values_mm) < 0 < np.nanmax(fit.values_mm)  # of depth: both signs
+    for head in (*composed(surface="skin").heads, composed(surface="depth").heads[0]):
+        assert head.values_mm is None
 
 
 def test_blinking_heads_are_whole_and_in_one_place():

@@ -12,8 +12,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from .fields import FIELDS, MODES, PINS
-from .state import DEFAULT, ViewState, changed, short
+from .fields import FIELDS, MODES, PINS, tidy
+from .state import DEFAULT, ViewState, changed, names_of_pins, short
 
 ROW_DISTANCES = (0.3, 0.6, 1.2, 2.4)  # metres, of the strip of faces
 NEARER = 2 ** (-1 / 24)  # one step of the distance slider: 3 %
@@ -58,7 +58,13 @@ def _overlay(name: str) -> Callable[[ViewState], ViewState]:
 def pin(state: ViewState) -> ViewState:
     """The state with its face kept; the oldest goes when there is no room, a face already kept moves to the end."""
     kept = short(state)
-    return changed(state, pins=(*(p for p in state.pins if p != kept), kept)[-PINS:])
+    named = list(zip(state.pins, names_of_pins(state), strict=True))
+    name = next((name for face, name in named if face == kept), "")
+    return _with_pins(state, [*(one for one in named if one[0] != kept), (kept, name)][-PINS:])
+
+
+def _with_pins(state: ViewState, named: list[tuple[ViewState, str]]) -> ViewState:
+    return changed(state, pins=[face for face, _ in named], pin_names=[name for _, name in named])
 
 
 def pin_distances(state: ViewState) -> ViewState:
@@ -66,12 +72,30 @@ def pin_distances(state: ViewState) -> ViewState:
     faces = (
         changed(short(state), distance=metres, camera="perspective") for metres in ROW_DISTANCES
     )
-    return changed(state, pins=tuple(faces), show="row")
+    return changed(state, pins=tuple(faces), pin_names=(), show="row")
 
 
 def unpin(number: int) -> Callable[[ViewState], ViewState]:
     """The change that lets one pin go, counted from 0."""
-    return lambda state: changed(state, pins=state.pins[:number] + state.pins[number + 1 :])
+
+    def change(state: ViewState) -> ViewState:
+        named = list(zip(state.pins, names_of_pins(state), strict=True))
+        return _with_pins(state, named[:number] + named[number + 1 :])
+
+    return change
+
+
+def rename(number: int, name: str) -> Callable[[ViewState], ViewState]:
+    """The change that names one pin, counted from 0; an empty name takes it back to its number."""
+
+    def change(state: ViewState) -> ViewState:
+        names = list(names_of_pins(state))
+        if number >= len(names):  # removed meanwhile
+            return state
+        names[number] = tidy(name)
+        return changed(state, pin_names=names)
+
+    return change
 
 
 def visit(number: int) -> Callable[[ViewState], ViewState]:

@@ -12,7 +12,7 @@ from typing import cast
 
 import viser
 
-from . import figures, guard, history, own_page
+from . import figures, guard, history, own_page, under
 from .actions import ACTIONS
 from .display import Display, Rest
 from .fields import FIELDS
@@ -36,6 +36,7 @@ from .script import (
     Hello,
     Key,
     Point,
+    Probe,
     Report,
     Script,
     Theme,
@@ -67,6 +68,9 @@ class Browser:
         self._glide = Glide(self._glided)
         self._still = False  # whether this person wants no motion
         self._dark = False  # whether this person's system is dark
+        self._probing = False  # whether the page may ask what is under the pointer
+        self._probed = ""  # what it was answered
+        self._settled: ViewState | None = None  # the state drawn in full last
         self._owned = False  # whether there is a photograph of this person
         self.stage = Stage(client, self._orbited)
         self._dress()
@@ -83,6 +87,7 @@ class Browser:
         self._saving = Saving(
             client, loop, orders, now=lambda: self.room.state, go=self._opened,
             show=lambda shown: self.panel.export.show(shown), notice=self.notice,
+            own=lambda: self._own.photo,
         )  # fmt: skip
         self.panel = Panel(
             client.gui, people, self.change, self.act, narrow=self.stage.narrow,
@@ -151,6 +156,7 @@ class Browser:
         """Be where a history says, and show it: widgets at once, heads and numbers when a worker is free."""
         before, self._history = self.room.state, to
         self.room.go(to.now)
+        self._read(before, to.now)
         if (before.theme, before.text) != (to.now.theme, to.now.text):
             self._dress()
             self.script.theme(cast(Theme, to.now.theme), to.now.text)
@@ -194,6 +200,25 @@ class Browser:
                 self._client.add_notification(say("app.title"), words, auto_close_seconds=3.0)
             case Point() | Click() | Gone():
                 self._own.hear(report)
+            case Probe():
+                self._answer(report)
+
+    def _answer(self, probe: Probe) -> None:
+        """Say what is under the pointer; nothing while what is drawn is not yet what the state says."""
+        mm = None
+        if self.room.state == self._settled:
+            mm = self.stage.value(probe.head, probe.vertex)
+        self._probed = under.words(self.room.state, mm)
+        self.script.probed(probe.n, self._probed)
+
+    def _read(self, before: ViewState, now: ViewState) -> None:
+        """Let the pointer read numbers where colours are some; what it has read of another state holds no more."""
+        if self._probed and now != before:
+            self._probed = ""
+            self.script.probed(0, "")
+        if under.has_values(now) != self._probing:
+            self._probing = not self._probing
+            self.script.probe(self._probing)
 
     def _own_changed(self) -> None:
         """Another photograph, other points, or none any more: show them."""
@@ -278,6 +303,7 @@ class Browser:
     def _settle(self, drawn: ViewState, rest: Rest) -> None:
         """At rest, on the loop: what the controls show is what is, even where messages crossed on the way."""
         if not self.room.left and self.room.state == drawn:
+            self._settled = drawn
             self._hint = rest.hint
             self._show_own()
             self.script.address(query(drawn))

@@ -23,11 +23,12 @@ from faceambig.arrays import vertex_normals
 from faceambig.compose import Face, curves
 from faceambig.io.meshes import Mesh, encode_glb, encode_obj, encode_ply
 from faceambig.io.pictures import DIAGONAL_35MM
-from faceambig.scene import Curves, Scene
+from faceambig.scene import Curves, Head, Scene
 
-from . import faces, fits, likely, pipeline
+from . import faces, fits, likely, pipeline, told
 from .forms import to_json
 from .provenance import file_name, notes, provenance, shown
+from .scenes import pin_face
 from .state import DEFAULT, Fitting, Target, ViewState, changed
 
 SCALES = (1, 2, 4)  # of a picture
@@ -94,12 +95,24 @@ def picture(
 
     transparent: nothing behind the heads. overlays: False leaves the heads alone, without words, marks and numbers.
     """
-    from faceambig.render.overlay import draw, encode_png
-
     if scale not in SCALES:
         raise ValueError(f"scale: {scale!r} is not one of {', '.join(map(str, SCALES))}")
     scene = pipeline.frame(state).scene
     scene = scene if own_photo else without_own_photo(scene)
+    return picture_of(scene, state, scale, transparent, overlays, progress)
+
+
+def picture_of(
+    scene: Scene,
+    state: ViewState,
+    scale: int,
+    transparent: bool,
+    overlays: bool,
+    progress: Progress | None,
+) -> tuple[str, bytes]:
+    """A scene of a state as a PNG; the options are those of `picture`."""
+    from faceambig.render.overlay import draw, encode_png
+
     step = None if progress is None else _counted(scene, progress)
     rgba = draw(scene, scale=scale, transparent=transparent, overlays=overlays, step=step)
     if progress is not None:
@@ -130,11 +143,15 @@ def mesh(state: ViewState, kind: str, *, face: str = "fit") -> tuple[str, bytes]
     state = changed(state, show="both")
     scene = pipeline.frame(state, with_curves=False).scene
     head = next(head for head in scene.heads if head.name == face)
+    return mesh_of(head, state, kind, face)
+
+
+def mesh_of(head: Head, state: ViewState, kind: str, words: str) -> tuple[str, bytes]:
+    """A head as one of MESHES; its file is called by `words`."""
     about = (head.title, *notes(state))
-    written = Mesh(
-        head.vertices, head.faces, head.colours, vertex_normals(head.vertices, head.faces), about
-    )
-    return file_name(shown(state), f"{face}.{kind}"), MESHES[kind](written)
+    normals = vertex_normals(head.vertices, head.faces)
+    written = Mesh(head.vertices, head.faces, head.colours, normals, about)
+    return file_name(shown(state), f"{words}.{kind}"), MESHES[kind](written)
 
 
 def state_file(state: ViewState) -> tuple[str, bytes]:
@@ -144,8 +161,12 @@ def state_file(state: ViewState) -> tuple[str, bytes]:
 
 def numbers(state: ViewState, kind: str) -> tuple[str, bytes]:
     """The numbers of a state as "json", or as "csv": a line a number, with its place and its unit."""
+    return numbers_of(measured(state), state, kind)
+
+
+def numbers_of(record: Mapping[str, Any], state: ViewState, kind: str) -> tuple[str, bytes]:
+    """A record of numbers of a state as "json" or "csv"."""
     name = file_name(shown(state), f"numbers.{kind}")
-    record = measured(state)
     if kind == "json":
         return name, (json.dumps(record, indent=1) + "\n").encode()
     text = io.StringIO()
@@ -163,7 +184,23 @@ def measured(state: ViewState) -> dict[str, Any]:
     """
     state = changed(state, show="both")
     face = faces.face(state.target, state.fitting, state.bend)
-    fit, origin = face.fit, provenance(state)
+    return {
+        **source_of(state),
+        "subject": fits.photograph(state.target).subject.name,
+        "actual_m": state.actual,
+        **numbers_of_fit(state, face.fit),
+        "plausible": face.plausible,
+        "d_l_percent": face.d_l_percent,
+        "d_s_mm": face.d_s_mm,
+        "alpha": _alpha(state, face).tolist(),
+        **_along_distance(state),
+        **({"pins": _pins(state)} if state.pins else {}),
+    }
+
+
+def source_of(state: ViewState) -> dict[str, Any]:
+    """What a record of numbers begins with: its format, and where it comes from."""
+    origin = provenance(state)
     return {
         "format": "faceambig-numbers",
         "version": FORMAT_VERSION,
@@ -171,24 +208,33 @@ def measured(state: ViewState) -> dict[str, Any]:
         "model": origin["Model"],
         "licence": origin["Licence"],
         "state": json.loads(to_json(state)),
-        "subject": fits.photograph(state.target).subject.name,
-        "actual_m": state.actual,
+    }
+
+
+def numbers_of_fit(state: ViewState, fit: fa.Fit) -> dict[str, Any]:
+    """The numbers of a fit that a bend leaves as they are."""
+    return {
         "camera": state.camera,
         "distance_m": fit.distance,
         "status": str(fit.status),
-        "plausible": face.plausible,
-        "d_l_percent": face.d_l_percent,
         "d_l_unit": fit.interocular_meaning,
-        "d_s_mm": face.d_s_mm,
         "focal_px": fit.focal,
-        "focal_35mm": _focal_35mm(fit),
+        "focal_35mm": focal_35mm(fit),
         "scale": fit.scale,
         "rotation": fit.rotation.tolist(),
         "translation_m": fit.translation.tolist(),
         "cost": fit.cost,
-        "alpha": _alpha(state, face).tolist(),
-        **_along_distance(state),
     }
+
+
+def _pins(state: ViewState) -> list[dict[str, Any]]:
+    """Each face that is kept: what it is called, how far off it is, and d_S to each of them in their order."""
+    kept = told.pins_of(changed(state, hide=()))
+    shown = [pin_face(pin) for pin in state.pins]
+    return [
+        {"name": name, "d_l_percent": face.d_l_percent, "d_s_mm": face.d_s_mm, "between_mm": row.tolist()}
+        for name, face, row in zip(kept.names, shown, kept.d_s_mm, strict=True)
+    ]  # fmt: skip
 
 
 def _alpha(state: ViewState, face: Face) -> np.ndarray:
@@ -200,7 +246,7 @@ def _alpha(state: ViewState, face: Face) -> np.ndarray:
     return face.fit.alpha + sum(mm * modes.directions[mode - 1] for mode, mm in state.flex)
 
 
-def _focal_35mm(fit: fa.Fit) -> float | None:
+def focal_35mm(fit: fa.Fit) -> float | None:
     """Millimetres of the lens that frames the picture so on 35 mm film, diagonals compared; None if far away."""
     size = fit.observation.image_size
     if fit.focal is None or size is None:
@@ -210,7 +256,11 @@ def _focal_35mm(fit: fa.Fit) -> float | None:
 
 def _along_distance(state: ViewState) -> dict[str, Any]:
     """Interval and curves of a target over all distances."""
-    sweep, curve = swept(state.target, state.fitting._replace(distance=None))
+    return along_distance(*swept(state.target, state.fitting._replace(distance=None)))
+
+
+def along_distance(sweep: fa.Sweep, curve: Curves) -> dict[str, Any]:
+    """Interval and curves of a sweep."""
     interval = sweep.interval()
     fits = (*sweep.fits, sweep.orthographic)
     return {
@@ -227,7 +277,7 @@ def _along_distance(state: ViewState) -> dict[str, Any]:
             "d_l_percent": [*curve.d_l_percent.tolist(), curve.orthographic[0]],
             "d_s_mm": [*curve.d_s_mm.tolist(), curve.orthographic[1]],
             "focal_px": [fit.focal for fit in fits],
-            "focal_35mm": [_focal_35mm(fit) for fit in fits],
+            "focal_35mm": [focal_35mm(fit) for fit in fits],
             "status": [str(fit.status) for fit in fits],
         },
     }
@@ -256,7 +306,7 @@ def _rows(record: Mapping[str, Any]) -> list[tuple[str, object, object, str]]:
     """(quantity, at, value, unit) of each number: `at` is an axis, a mode from 1, or metres assumed, inf far away."""
     rows: list[tuple[str, object, object, str]] = []
     for name, value in record.items():
-        if name in ("format", "version", "software", "model", "licence", "state", "curves"):
+        if name in ("format", "version", "software", "model", "licence", "state", "curves", "pins"):
             continue
         if isinstance(value, Mapping):
             rows += [(f"{name}_{part}", "", _cell(v), _unit(part)) for part, v in value.items()]
@@ -266,6 +316,13 @@ def _rows(record: Mapping[str, Any]) -> list[tuple[str, object, object, str]]:
             rows += [(name, at, v, unit) for at, v in zip(places, value, strict=True)]
         else:
             rows.append((name, "", _cell(value), _unit(name)))
+    # By numbers, as a table's program may take a name for a formula; the names are in the state above
+    for number, pin in enumerate(record.get("pins", ()), start=1):
+        rows += [
+            (f"pin_{name}", number, pin[name], _unit(name)) for name in ("d_l_percent", "d_s_mm")
+        ]
+        between = enumerate(pin["between_mm"], start=1)
+        rows += [("pin_between_mm", f"{number}-{k}", mm, "mm") for k, mm in between if k > number]
     metres = record["curves"]["distance_m"]
     for name, values in record["curves"].items():
         if name != "distance_m":

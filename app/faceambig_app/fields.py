@@ -7,16 +7,17 @@ keyword of ViewState(...), its range, and the words of its help. Metres and degr
 from __future__ import annotations
 
 import math
+import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
 # number: float; whole: int; choice: one of `choices`; names: a tuple of some of `choices`, in their order; name: a
 # model; subject: a whole number or "photo"; index: a whole number or None; modes: (mode, mm) pairs; orbit: (azimuth,
-# elevation) or None; pins: short states
+# elevation) or None; pins: short states; words: a tuple of short texts of a person's own, "" where none is given
 Kind = Literal[
-    "number", "whole", "choice", "names", "name", "subject", "index", "modes", "orbit", "pins"
-]
+    "number", "whole", "choice", "names", "name", "subject", "index", "modes", "orbit", "pins", "words"
+]  # fmt: skip
 # Which cached step of the pipeline a field is a key of; "page": of none, it is the browser's alone
 Part = Literal["target", "fitting", "bend", "look", "page"]
 
@@ -24,6 +25,10 @@ MODES = 3  # flexibility modes bent at once
 LAST_MODE = 100
 PINS = 5
 NAME_LENGTH = 1000  # characters of a model's name or path
+PIN_NAME_LENGTH = 30  # characters
+# Signs that would break a line, or turn round the words that follow: controls, half characters, marks of direction
+_NO_WORDS = ("Cc", "Cs")
+_TURNING = ("LRE", "RLE", "LRO", "RLO", "PDF", "LRI", "RLI", "FSI", "PDI")
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,6 +127,10 @@ _ROWS = (
         f"up to {PINS} faces kept to compare, like distance:0.6..distance:2.4,subject:3",
     ),
     Field(
+        "pin_names", "words", "page",
+        f"names of the kept faces in their order, up to {PIN_NAME_LENGTH} characters each, like Near,,Far",
+    ),
+    Field(
         "theme", "choice", "page", "colours of the page",
         choices=("auto", "light", "dark"), view=True,
     ),
@@ -160,6 +169,8 @@ def canonical(field: Field, value: Any) -> Any:
             return None if value is None else _orbit(field, value)
         case "pins":
             return _several(field, value)
+        case "words":
+            return _words(field, value)
 
 
 def _number(field: Field, value: Any) -> float:
@@ -216,6 +227,41 @@ def _name(field: Field, value: Any) -> str:
     if any(character < " " or "\ud800" <= character <= "\udfff" for character in value):
         raise ValueError(f"{field.name}: {short_repr(value)} has characters no name has")
     return value
+
+
+def _words(field: Field, value: Any) -> tuple[str, ...]:
+    """Short texts, with one space between words; without empty ones at the end."""
+    if isinstance(value, set | frozenset):  # their order is what they are for
+        raise ValueError(f"{field.name}: {short_repr(value)} is not a tuple or a list")  # pyright: ignore[reportUnknownArgumentType]
+    given = list(_several(field, value))
+    for at, text in enumerate(given):
+        if not isinstance(text, str):
+            raise ValueError(f"{field.name}: {short_repr(text)} is not a text")
+        given[at] = " ".join(text.split())
+        if len(given[at]) > PIN_NAME_LENGTH:
+            raise ValueError(
+                f"{field.name}: {short_repr(text)} is longer than {PIN_NAME_LENGTH} characters"
+            )
+        if not all(map(_is_of_words, given[at])):
+            raise ValueError(f"{field.name}: {short_repr(text)} has characters no name has")
+    while given and not given[-1]:
+        given.pop()
+    if len(given) > PINS:
+        raise ValueError(f"{field.name}: {len(given)} of them; give at most {PINS}")
+    return tuple(given)
+
+
+def _is_of_words(character: str) -> bool:
+    return (
+        unicodedata.category(character) not in _NO_WORDS
+        and unicodedata.bidirectional(character) not in _TURNING
+    )
+
+
+def tidy(text: str) -> str:
+    """The nearest text that a pin's name may be: what is typed is cut, never refused."""
+    plain = "".join(filter(_is_of_words, " ".join(text.split())))
+    return " ".join(plain[:PIN_NAME_LENGTH].split())
 
 
 def _modes(field: Field, value: Any) -> tuple[tuple[int, float], ...]:

@@ -90,7 +90,7 @@ def pins(names: Sequence[str], words: Sequence[str], d_s_mm: Array) -> str:
     if not names:
         return f'<div class="fa"><p>{escape(say("pins.none"))}</p></div>'
     rows = "".join(
-        f"<li><b>{escape(name)}</b> {escape(text)}</li>"
+        f"<li><b><bdi>{escape(name)}</bdi></b> {escape(text)}</li>"
         for name, text in zip(names, words, strict=True)
     )
     listed = f'<div class="fa"><ul class="fa-small">{rows}</ul></div>'
@@ -181,13 +181,14 @@ def spectrum(values_mm: Array, words: Sequence[str]) -> str:
 
 def pin_matrix(names: Sequence[str], d_s_mm: Array) -> str:
     """d_S between pinned faces as a table: names P, d_s_mm (P, P)."""
-    head = "".join(f'<th scope="col">{escape(name)}</th>' for name in names)
+    called = [f"<bdi>{escape(name)}</bdi>" for name in names]  # of any script, right to left too
+    head = "".join(f'<th scope="col">{name}</th>' for name in called)
     rows = []
-    for i, name in enumerate(names):
+    for i, name in enumerate(called):
         cells = "".join(
             f"<td>{'' if i == j else f'{d_s_mm[i, j]:.1f}'}</td>" for j in range(len(names))
         )
-        rows.append(f'<tr><th scope="row">{escape(name)}</th>{cells}</tr>')
+        rows.append(f'<tr><th scope="row">{name}</th>{cells}</tr>')
     caption = escape(say("pins.matrix"))
     return (
         f'<div class="fa fa-wide"><table><caption>{caption}</caption><thead><tr><td></td>{head}</tr></thead>'

@@ -1,7 +1,7 @@
 """A ViewState as text: each value by itself, the JSON of a state, the flags of the command line.
 
-Values are written with the signs A-Z a-z 0-9 . _ , : - only (a model's name may have others), so that a link needs no
-escapes. Numbers are written in full: what is read is what was written, to the last bit.
+Values are written with the signs A-Z a-z 0-9 . _ , : - only (names of models and pins may have others), so that a link
+needs no escapes. Numbers are written in full: what is read is what was written, to the last bit.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import json
 import math
 import shlex
 from typing import Any
+from urllib.parse import unquote
 
 import msgspec
 
@@ -38,6 +39,8 @@ def text_of(field: Field, value: Any) -> str:
             return NONE if value is None else str(value)
         case "pins":
             return PIN_END.join(map(_pin_text, value)) or NONE
+        case "words":
+            return _words_text(value)
         case _:
             return str(value)
 
@@ -74,6 +77,8 @@ def value_of(field: Field, text: str) -> Any:
             if len(pins) > PINS:
                 raise ValueError(f"pins: {len(pins)} of them; give at most {PINS}")
             return tuple(_pin(pin) for pin in pins)
+        case "words":
+            return tuple(map(unquote, text.split(",")))
 
 
 def set_fields(state: ViewState) -> dict[str, Any]:
@@ -162,6 +167,12 @@ def _modes(field: Field, text: str) -> tuple[tuple[int, float], ...]:
         mode, colon, mm = item.rpartition(":")
         pairs.append((_whole(field, mode) if colon else 1, _number(field, mm)))
     return tuple(pairs)
+
+
+def _words_text(words: tuple[str, ...]) -> str:
+    """Texts with commas between them; within one, a comma and the sign that escapes it are escaped."""
+    text = ",".join(word.replace("%", "%25").replace(",", "%2C") for word in words)
+    return text.replace("n", "%6E", 1) if text == NONE else text or NONE
 
 
 def _number(field: Field, text: str) -> float:

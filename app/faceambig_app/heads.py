@@ -77,6 +77,7 @@ class HeadNodes:
         self._painted: object = head.colours
         self._behind = False  # whether the full mesh has an older face than the coarse one
         self._looks: object = None  # of the meshes: (draft, seen, opacity)
+        self._values = head.values_mm
         self._offset = 0.0  # metres along the viewer's right
         self._wanted: Board | None = Board(head.title, 0.0, (), 0.0)  # no scene's
         self._placed: object = (
@@ -89,6 +90,7 @@ class HeadNodes:
 
     def show(self, points: NDArray[np.float64], head: Head, draft: bool) -> None:
         """Send what changed of the head at `points` (V, 3), metres; equal arrays send nothing."""
+        self._values = head.values_mm
         self._move(points, draft)
         self._look(head, draft)
 
@@ -96,6 +98,7 @@ class HeadNodes:
         """As `show` at the points that the meshes have; False if a coarse mesh alone has them and a full one is due."""
         if not draft and self._behind:
             return False
+        self._values = head.values_mm
         self._look(head, draft)
         return True
 
@@ -120,6 +123,11 @@ class HeadNodes:
         if head.colours is not self._painted:
             self._painted = head.colours
             self._colours.colors = shaded(head)
+
+    def value(self, vertex: int) -> float | None:
+        """Millimetres that the colour of a vertex means, NaN where nothing is measured; None where it means none."""
+        values = self._values
+        return None if values is None or vertex >= len(values) else float(values[vertex])
 
     def write(self, board: Board | None) -> None:
         """The words above and below; None where another head of the slot, or nothing, has them."""

@@ -7,7 +7,8 @@ What was found is told in words by notices.py.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection
+import re
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from typing import Any, Literal
 from urllib.parse import quote, unquote_plus
@@ -20,6 +21,13 @@ LONGEST_VALUE = 4000  # characters: five pins of all their fields have half of i
 SHOWN = 24  # characters of what a link says that are repeated
 
 OF_THE_PAGE = ("darkMode", "fixedDpr")  # what viser's page itself reads from its address
+
+# A server that lets no unknown name into its page's address leaves word of them: ignored=spin,lens
+IGNORED = "ignored"
+MOST_IGNORED = 8  # names
+_IGNORED = re.compile(
+    rf"[\w.-]{{1,{SHOWN}}}(,[\w.-]{{1,{SHOWN}}}){{0,{MOST_IGNORED - 1}}}", re.ASCII
+)
 
 Kind = Literal["long", "newer", "unknown", "twice", "range", "malformed", "orbit", "model", "photo"]
 
@@ -74,8 +82,9 @@ def read(
         return DEFAULT, (Finding("long"),)
     given, twice = _pairs(text.removeprefix("?"))
     findings: list[Finding] = []
-    ours = (*FIELDS, "v", *OF_THE_PAGE)
+    ours = (*FIELDS, "v", IGNORED, *OF_THE_PAGE)
     unknown = tuple(shown(name) or "?" for name in given if name not in ours)
+    unknown += told_ignored(given.get(IGNORED, ""))
     if _newer(given.get("v"), findings):
         findings.append(Finding("newer", unknown))
     elif unknown:
@@ -90,6 +99,17 @@ def read(
         del values["view"]
         findings.append(Finding("orbit", ("view",)))
     return ViewState(**values), tuple(findings)
+
+
+def ignored(names: Iterable[str]) -> str:
+    """The value of IGNORED that tells of names as an address has them: few, short, of letters and digits alone."""
+    plain = (re.sub(r"[^\w.-]", "_", unquote_plus(name), flags=re.ASCII)[:SHOWN] for name in names)
+    return ",".join(list(dict.fromkeys(name or "_" for name in plain))[:MOST_IGNORED])
+
+
+def told_ignored(value: str) -> tuple[str, ...]:
+    """The names in a value of IGNORED; none if it is not what `ignored` writes."""
+    return tuple(value.split(",")) if _IGNORED.fullmatch(value) else ()
 
 
 def _pairs(text: str) -> tuple[dict[str, str], tuple[str, ...]]:

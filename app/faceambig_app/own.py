@@ -246,7 +246,7 @@ def own_frame(own: OwnPhoto | None, state: ViewState, draft: bool) -> OwnFrame:
     subject = reference(own, state, draft)
     if state.show == "row":
         return OwnFrame(_row(own, state, subject))
-    face = _face(own, state, fitting, subject)
+    face = own_face(own, state, fitting, subject)
     scene = _scene(own, state, subject, face, None if draft else own_curves(own, state))
     if draft:
         return OwnFrame(scene)
@@ -284,14 +284,19 @@ def reference(own: OwnPhoto, state: ViewState, draft: bool) -> Subject:
 
 def own_curves(own: OwnPhoto, state: ViewState) -> Curves:
     """d_L, and the difference to the fit at 60 cm, over all distances."""
+    return own_sweep(own, state)[1]
+
+
+def own_sweep(own: OwnPhoto, state: ViewState) -> tuple[fa.Sweep, Curves]:
+    """The sweep behind the curves, and the curves."""
     fitting = state.fitting._replace(distance=None)
 
-    def computed() -> Curves:
+    def computed() -> tuple[fa.Sweep, Curves]:
         sweep = fa.sweep_distance(
             model(state.model), _observation(own), modes=_count(fitting), box=fitting.box,
             noise_percent=fitting.prior, tolerance=1e-6,
         )  # fmt: skip
-        return curves(reference(own, state, draft=True), sweep, None)
+        return sweep, curves(reference(own, state, draft=True), sweep, None)
 
     return _once(own, ("curves", state.model, fitting), computed)
 
@@ -346,7 +351,7 @@ def _modes(own: OwnPhoto, state: ViewState, fitting: Fitting, count: int) -> Fle
     return _once(own, ("modes", state.model, fitting, how, count), computed)
 
 
-def _face(own: OwnPhoto, state: ViewState, fitting: Fitting, subject: Subject) -> Face:
+def own_face(own: OwnPhoto, state: ViewState, fitting: Fitting, subject: Subject) -> Face:
     """The fitted face, bent as the state says, measured against the reference."""
     if state.draw is not None or state.extreme is not None:
         raise ValueError(say("own.no_draw"))
@@ -354,9 +359,7 @@ def _face(own: OwnPhoto, state: ViewState, fitting: Fitting, subject: Subject) -
     if not state.flex:
         return measure(subject, fit)
     last = max(mode for mode, _ in state.flex)
-    if last > len(fit.alpha):
-        raise ValueError(f"flex: mode {last} of a fit with {len(fit.alpha)} modes")
-    modes = _modes(own, state, fitting, last)
+    modes = _bending(own, state, fitting, len(fit.alpha))
     by_mode = dict(state.flex)
     amounts = [by_mode.get(mode, 0.0) for mode in range(1, last + 1)]
     return measure(
@@ -364,6 +367,22 @@ def _face(own: OwnPhoto, state: ViewState, fitting: Fitting, subject: Subject) -
         limit=max(plausible_limit(len(fit.alpha)), float(np.linalg.norm(fit.alpha))),
         flex=[(modes.words[mode - 1], mm) for mode, mm in state.flex],
     )  # fmt: skip
+
+
+def _bending(own: OwnPhoto, state: ViewState, fitting: Fitting, count: int) -> FlexibilityModes:
+    """The modes up to the last that is bent, of a fit with `count` coefficients."""
+    last = max(mode for mode, _ in state.flex)
+    if last > count:
+        raise ValueError(f"flex: mode {last} of a fit with {count} modes")
+    return _modes(own, state, fitting, last)
+
+
+def own_alpha(own: OwnPhoto, state: ViewState, fit: fa.Fit) -> Array:
+    """(S,) coefficients of the face shown, its bend included."""
+    if not state.flex:
+        return fit.alpha
+    modes = _bending(own, state, state.fitting, len(fit.alpha))
+    return fit.alpha + sum(mm * modes.directions[mode - 1] for mode, mm in state.flex)
 
 
 def _scene(
@@ -408,7 +427,9 @@ def _told(own: OwnPhoto, picture: Photo) -> Photo:
 
 def _row(own: OwnPhoto, state: ViewState, subject: Subject) -> Scene:
     """The reference and the fits at four distances, coloured by their difference to it."""
-    faces = [_face(own, state, state.fitting._replace(distance=d), subject) for d in ROW_DISTANCES]
+    faces = [
+        own_face(own, state, state.fitting._replace(distance=d), subject) for d in ROW_DISTANCES
+    ]
     titles = [say("head.assumed", distance=centimetres(d)) for d in ROW_DISTANCES]
     captions = [
         (

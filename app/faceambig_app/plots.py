@@ -1,6 +1,6 @@
 """The curves of the page as SVG: d_L, d_S and how likely each distance is, over one axis with one cursor.
 
-Colours are CSS variables of style.STYLE. The same numbers stand in a table that is folded away.
+Colours are CSS variables of style.STYLE. The same numbers stand in a table (plottable.py) that is folded away.
 """
 
 from __future__ import annotations
@@ -15,9 +15,11 @@ import numpy as np
 from faceambig.arrays import Array
 from faceambig.scene import Curves, Numbers
 
+from .plottable import table
 from .text import NARROW, centimetres, percent_number, say
 
-WIDTH, LEFT, RIGHT = 340, 34, 330  # in SVG units
+WIDTH, LEFT, RIGHT = 340, 34, 290  # in SVG units; the distances end at RIGHT
+FAR, END = 322, 332  # of the far-away camera, which stands beyond all distances; of bands and grid
 NEAREST, FARTHEST = 0.2, 3.0  # metres, of the axis
 OCTAVES = math.log2(FARTHEST / NEAREST)
 TICKS_CM = (20, 30, 60, 120, 240)
@@ -26,7 +28,6 @@ LIKELY_TOP, LIKELY_BOTTOM = 256, 300
 BARS_AT = (324, 310)  # of the middle halves and the 95 %, below the density
 D_L_MAX = 6.0  # percent
 AUTOMATIC_PERCENT = 5.0  # the gap of points that a program finds
-MOST_ROWS = 25  # of the table
 KEPT = 64  # curves whose unmoving part is kept: a class drags over one photograph each
 
 
@@ -70,8 +71,10 @@ def _ground(curves: Curves, reference: str, top: float, true: bool, actual: bool
         *_d_s_plot(curves, reference, top, true),
         *(() if curves.density is None else _likely_plot(curves)),
         *(_tick(cm, ticks_at) for cm in TICKS_CM),
+        _far_tick(ticks_at),
         f'<text x="{(LEFT + RIGHT) / 2}" y="{ticks_at + 35}" text-anchor="middle">{escape(say("plot.axis"))}</text>',
         _true_line(curves, _last(curves)) if actual else "",
+        _far_marks(curves, top, true),
     ]
     return "".join(parts)
 
@@ -93,7 +96,7 @@ def _ranges(curves: Curves) -> tuple[float, float, float, float]:
 
 def d_s_axis(curves: Curves, numbers: Numbers) -> float:
     """End of the d_S axis: 12 mm, growing in steps of 4."""
-    largest = max(_ranges(curves)[3], numbers.d_s_mm)
+    largest = max(_ranges(curves)[3], curves.orthographic[1], numbers.d_s_mm)
     return 4.0 * max(3, math.ceil(largest / 4.0))
 
 
@@ -128,7 +131,7 @@ def interval_words(curves: Curves) -> str:
         return say("plot.none", tolerance=percent)
     return say(
         "plot.interval",
-        low=_whole(found[0]),
+        low=f"{100 * found[0]:.0f}",
         high=centimetres(_rounded(found[1])),
         tolerance=percent,
     )
@@ -155,36 +158,6 @@ def _rounded(metres: float) -> float:
     return round(100 * metres) / 100
 
 
-def _whole(metres: float) -> str:
-    return f"{100 * metres:.0f}"
-
-
-def table(curves: Curves, true: bool = True) -> str:
-    """The curves as numbers, folded away; at most MOST_ROWS of them, first and last among them."""
-    n = len(curves.distances)
-    rows = np.unique(np.linspace(0, n - 1, min(n, MOST_ROWS)).round().astype(int))
-    heads = [say("plot.axis"), say("plot.d_l"), *([say("plot.d_s")] if true else [])]
-    likely = curves.density
-    if likely is not None:
-        heads.append(say("plot.likely_share"))
-    body = []
-    for row in rows:
-        cells = [percent_number(float(curves.d_l_percent[row]))]
-        if true:
-            cells.append(f"{curves.d_s_mm[row]:.1f}")
-        if likely is not None:
-            cells.append(f"{100 * likely[row]:.0f}")
-        numbers = "".join(f"<td>{cell}</td>" for cell in cells)
-        body.append(
-            f'<tr><th scope="row">{_whole(float(curves.distances[row]))}</th>{numbers}</tr>'
-        )
-    head = "".join(f'<th scope="col">{escape(text)}</th>' for text in heads)
-    return (
-        f'<details><summary>{escape(say("plot.table"))}</summary><div class="fa-wide"><table><thead><tr>{head}</tr>'
-        f"</thead><tbody>{''.join(body)}</tbody></table></div></details>"
-    )
-
-
 def _alternative(curves: Curves, numbers: Numbers) -> str:
     least_l, most_l, least_s, most_s = _ranges(curves)
     return say(
@@ -200,9 +173,9 @@ def _d_l_plot(curves: Curves) -> list[str]:
     line = _line(_x(curves.distances), _y(curves.d_l_percent, D_L_MAX, D_L_TOP, D_L_BOTTOM))
     return [
         _title(say("plot.d_l"), D_L_TOP, "dl"),
-        f'<path d="M{LEFT} {band:.1f}H{RIGHT}V{D_L_BOTTOM}H{LEFT}z" fill="var(--fa-band)"/>',
+        f'<path d="M{LEFT} {band:.1f}H{END}V{D_L_BOTTOM}H{LEFT}z" fill="var(--fa-band)"/>',
         *(_grid(value, D_L_MAX, D_L_TOP, D_L_BOTTOM) for value in (0, 3, 6)),
-        f'<path d="M{LEFT} {automatic:.1f}H{RIGHT}" stroke="var(--fa-dim)" stroke-dasharray="5 4"/>',
+        f'<path d="M{LEFT} {automatic:.1f}H{END}" stroke="var(--fa-dim)" stroke-dasharray="5 4"/>',
         _note(automatic + 12, say("plot.automatic")),
         _note(band + 13, say("plot.band")),
         f'<polyline points="{line}" fill="none" stroke="var(--fa-dl)" stroke-width="2.2" stroke-dasharray="6 3"/>',
@@ -250,7 +223,7 @@ def _title(text: str, top: int, tone: str) -> str:
 
 
 def _note(y: float, text: str) -> str:
-    return f'<text x="{RIGHT - 3}" y="{y:.1f}" text-anchor="end">{escape(text)}</text>'
+    return f'<text x="{END - 3}" y="{y:.1f}" text-anchor="end">{escape(text)}</text>'
 
 
 def _x(metres: Array) -> Array:
@@ -281,7 +254,7 @@ def _line(x: Array, y: Array) -> str:
 def _grid(value: float, top_value: float, top: int, bottom: int) -> str:
     y = _at(value, top_value, top, bottom)
     return (
-        f'<path d="M{LEFT} {y:.1f}H{RIGHT}" stroke="var(--fa-line)"/>'
+        f'<path d="M{LEFT} {y:.1f}H{END}" stroke="var(--fa-line)"/>'
         f'<text x="{LEFT - 6}" y="{y + 4:.1f}" text-anchor="end">{value:g}</text>'
     )
 
@@ -291,6 +264,24 @@ def _tick(cm: int, at: int) -> str:
     return (
         f'<path d="M{x:.1f} {at}v4" stroke="var(--fa-dim)"/>'
         f'<text x="{x:.1f}" y="{at + 17}" text-anchor="middle">{cm}</text>'
+    )
+
+
+def _far_tick(at: int) -> str:
+    return (
+        f'<path d="M{FAR} {at}v4" stroke="var(--fa-dim)"/>'
+        f'<text x="{WIDTH - 1}" y="{at + 17}" text-anchor="end">{escape(say("plot.far"))}</text>'
+    )
+
+
+def _far_marks(curves: Curves, d_s_top: float, true: bool) -> str:
+    """Where the curves are for the far-away camera: a ring and an open square, as the cursor's marks are filled."""
+    d_l, d_s = curves.orthographic
+    a, b = _d_l(d_l), _at(d_s, d_s_top, D_S_TOP, D_S_BOTTOM)
+    square = f'<rect x="{FAR - 3.6:.1f}" y="{b - 3.6:.1f}" width="7.2" height="7.2" stroke="var(--fa-ds)"/>'
+    return (
+        f'<g class="far" fill="none" stroke-width="1.5"><circle cx="{FAR}" cy="{a:.1f}" r="3.8" '
+        f'stroke="var(--fa-dl)"/>{square if true else ""}</g>'
     )
 
 
@@ -313,9 +304,7 @@ def _true_line(curves: Curves, last: int) -> str:
 
 
 def _cursor(numbers: Numbers, d_s_top: float, last: int, true: bool) -> str:
-    if numbers.distance is None:
-        return ""
-    x = _across(numbers.distance)
+    x = float(FAR) if numbers.distance is None else _across(numbers.distance)
     a, b = _d_l(numbers.d_l_percent), _at(numbers.d_s_mm, d_s_top, D_S_TOP, D_S_BOTTOM)
     square = (
         f'<rect x="{x - 4.2:.1f}" y="{b - 4.2:.1f}" width="8.4" height="8.4" fill="var(--fa-ds)"/>'

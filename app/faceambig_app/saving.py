@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import weakref
 from asyncio import AbstractEventLoop
 from collections.abc import Callable
 from functools import partial
@@ -10,10 +11,12 @@ from typing import Any
 
 import viser
 
+from . import own_export
 from .export import files
 from .guard import send_file
 from .notices import from_file
-from .orders import Orders, Progress
+from .orders import Orders, Progress, Work
+from .own import OwnPhoto
 from .panel.export import Shown
 from .state import ViewState
 from .text import NARROW, say
@@ -34,7 +37,9 @@ class Saving:
         go: Callable[[ViewState], None],
         show: Callable[[Shown], None],
         notice: Callable[[str], None],
+        own: Callable[[], OwnPhoto | None] = lambda: None,
     ) -> None:
+        self._own = own
         self._client, self._loop, self._orders = client, loop, orders
         self._now, self._go, self._show, self._notice = now, go, show, notice
         self._left = False
@@ -46,12 +51,27 @@ class Saving:
     def save(self, kind: str, **options: Any) -> None:
         """Order the state, as it is now, as a file."""
         state = self._now()
-
-        def work(progress: Progress) -> tuple[str, bytes]:
-            return files(state, kind, progress=progress, **options)
+        work = self._work(state, kind, options)
 
         if not self._orders.take(self, work):
             self._notice(say("export.busy"))
+
+    def _work(self, state: ViewState, kind: str, options: dict[str, Any]) -> Work:
+        """What makes the file. While it waits it holds nothing of an own photograph: Remove frees that."""
+        if state.subject != "photo":
+            return lambda progress: files(state, kind, progress=progress, **options)
+        photo = self._own()
+        shown = (lambda: None) if photo is None else weakref.ref(photo)
+        there = photo is not None
+        del photo
+
+        def work(progress: Progress) -> tuple[str, bytes]:
+            photo = shown()
+            if there and photo is None:
+                raise ValueError(say("own.gone"))
+            return own_export.files(photo, state, kind, progress=progress, **options)
+
+        return work
 
     def stop(self) -> None:
         """Take the order back."""

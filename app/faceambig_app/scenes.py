@@ -23,7 +23,7 @@ from faceambig.scene import Photo, Scene, View
 from .actions import ROW_DISTANCES
 from .faces import face
 from .fits import n_fitted, photograph
-from .state import DEFAULT, Bend, Look, Target, ViewState
+from .state import DEFAULT, Bend, Look, Target, ViewState, names_of_pins
 from .text import centimetres, distance_text, percent_number, say
 
 PHOTO_FULL, PHOTO_DRAFT = 560, 200  # pixels wide, of the page's photograph
@@ -139,7 +139,7 @@ def _pins(state: ViewState, look: Look) -> Scene:
     return compose_pins(
         [(taken.subject, shown) for taken, shown in kept],
         picture(state.pins[-1].target),
-        titles=[pin_title(number, pin) for number, pin in enumerate(state.pins, 1)],
+        titles=pin_titles(state),
         captions=[((taken.subject.name, "dim"), *_caption(shown)) for taken, shown in kept],
         legend_words=_legend("difference"),
         hide=look.hide,
@@ -153,9 +153,16 @@ def pin_face(pin: ViewState) -> Face:
     return face(pin.target, pin.fitting, pin.bend)
 
 
-def pin_title(number: int, pin: ViewState) -> str:
-    """A pin's number and where its face was seen from: `Pin 1, assumed 60 cm`."""
-    return f"{say('pin.name', number=number)}, {place_words(pin)}"
+def pin_names(state: ViewState) -> tuple[str, ...]:
+    """What each pin is called: its name, or its number."""
+    named = enumerate(names_of_pins(state), start=1)
+    return tuple(name or say("pin.name", number=number) for number, name in named)
+
+
+def pin_titles(state: ViewState) -> list[str]:
+    """What each pin is called, and where its face was seen from: `Pin 1, assumed 60 cm`."""
+    named = zip(pin_names(state), state.pins, strict=True)
+    return [f"{name}, {place_words(pin)}" for name, pin in named]
 
 
 def place_words(pin: ViewState) -> str:

@@ -16,13 +16,16 @@ from .guard import add_reports, data_html, log_line
 Theme = Literal["auto", "light", "dark"]
 _Pixel = Annotated[float, Meta(ge=0, le=65_536)]
 _Index = Annotated[int, Meta(ge=0, le=9_999)]
+LONGEST = 7_000  # characters of a query: five pins with long names; a request of more than 8 kB is refused
 _QUERY = re.compile(r"[A-Za-z0-9._,:;=&~*+%-]*")  # what no browser writes otherwise
 
 
 class Hello(Struct, frozen=True):
     """The first report of every connection: the address holds the state after a reconnection or a restart."""
 
-    query: Annotated[str, Meta(max_length=2_000)]  # of the address, without "?", as it stands there
+    query: Annotated[
+        str, Meta(max_length=LONGEST)
+    ]  # of the address, without "?", as it stands there
     reduced_motion: bool
     touch: bool
     dark: bool  # the system's preference
@@ -75,7 +78,15 @@ class Copied(Struct, frozen=True):
     ok: bool
 
 
-Report = Hello | Point | Click | Gone | Key | Hand | Dark | Copied
+class Probe(Struct, frozen=True):
+    """The pointer is over a vertex of a head. n counts the questions; the answer is `Script.probed`."""
+
+    n: Annotated[int, Meta(ge=1)]
+    head: Annotated[str, Meta(max_length=64)]
+    vertex: Annotated[int, Meta(ge=0, le=9_999_999)]
+
+
+Report = Hello | Point | Click | Gone | Key | Hand | Dark | Copied | Probe
 
 
 class _Envelope(Struct, frozen=True, forbid_unknown_fields=True):
@@ -89,6 +100,7 @@ class _Envelope(Struct, frozen=True, forbid_unknown_fields=True):
     hand: bool | UnsetType = UNSET
     dark: bool | UnsetType = UNSET
     copied: Copied | UnsetType = UNSET
+    probe: Probe | UnsetType = UNSET
 
 
 _decoder = msgspec.json.Decoder(_Envelope)
@@ -131,9 +143,9 @@ class Script:
 
     def address(self, query: str) -> None:
         """What the address bar shows after "/?"; viser's own harmless keys stay. No new entry of the history."""
-        if not _QUERY.fullmatch(query) or len(query) > 2_000:
+        if not _QUERY.fullmatch(query) or len(query) > LONGEST:
             raise ValueError(
-                f"query {query[:40]!r}: at most 2000 letters, digits and ._,:;=&~*+%-, the rest escaped"
+                f"query {query[:40]!r}: at most {LONGEST} letters, digits and ._,:;=&~*+%-, the rest escaped"
             )
         self._send("address", {"query": query})
 
@@ -175,6 +187,14 @@ class Script:
     def keys(self, on: bool) -> None:
         """Whether single keys are shortcuts; those with Ctrl, Alt or Meta always are."""
         self._send("keys", {"on": on})
+
+    def probe(self, on: bool) -> None:
+        """Whether the colours of a head are numbers: only then the page asks what is under the pointer."""
+        self._send("probe", {"on": on})
+
+    def probed(self, n: int, text: str) -> None:
+        """The answer to question n of `Probe`, shown where it was asked; "": what is shown holds no more."""
+        self._send("probed", {"n": n, "text": text})
 
     def words(self, words: dict[str, str]) -> None:
         """Section "page" of another language."""

@@ -74,6 +74,11 @@ class Stage:
         """Whether there is no room for a second panel."""
         return self._viewer.narrow
 
+    def value(self, head: str, vertex: int) -> float | None:
+        """What the colour of a head at a vertex means: see HeadNodes.value. None too if there is no such head."""
+        nodes = self._heads.get(head)
+        return None if nodes is None else nodes.value(vertex)
+
     def by_hand(self) -> None:
         """A hand is turning the viewer, as the page's script tells."""
         self._viewer.by_hand()

@@ -17,7 +17,7 @@ from .fields import FIELDS, PINS, Field, canonical
 
 __all__ = [
     "DEFAULT", "FIELDS", "VERSION", "Bend", "Field", "Fitting", "Look", "Target", "ViewState",
-    "changed", "short",
+    "changed", "names_of_pins", "short",
 ]  # fmt: skip
 
 VERSION = 1  # of the format of links and files
@@ -112,6 +112,7 @@ class ViewState(
     fade: float = 0.5
     hide: tuple[str, ...] = ()
     pins: tuple[ViewState, ...] = ()  # each as short() makes it, of this state's model
+    pin_names: tuple[str, ...] = ()  # of the pins in their order; "" or missing: by its number
     theme: str = "auto"
     text: float = 1.0
 
@@ -124,6 +125,8 @@ class ViewState(
             value = canonical(field, getattr(self, name))
             if field.kind == "pins" and value:
                 value = _pinned(value, self.model)
+            if name == "pin_names":  # after the pins; a name without a pin means nothing
+                value = canonical(field, value[: len(self.pins)])
             # A state is written to here and in changed() only: it is being made
             msgspec.structs.force_setattr(self, name, value)
         self.check()
@@ -163,12 +166,17 @@ _FIELDS_OF: dict[type[Any], Callable[[ViewState], tuple[Any, ...]]] = {
 }
 _OF_A_FACE = tuple(n for n, f in FIELDS.items() if f.part in ("target", "fitting", "bend"))
 _NOT_OF_A_FACE = tuple(name for name in FIELDS if name not in _OF_A_FACE)
-_ALONE = FIELDS.keys() - {"model", "pins"}  # what no other field's value depends on
+_ALONE = FIELDS.keys() - {"model", "pins", "pin_names"}  # what no other field's value depends on
 
 
 def short(state: ViewState) -> ViewState:
     """The state of a face alone, as it is pinned: target, fitting and bend; the look and the pins as by default."""
     return ViewState(**{name: getattr(state, name) for name in _OF_A_FACE})
+
+
+def names_of_pins(state: ViewState) -> tuple[str, ...]:
+    """The name of every pin; "" of one that has none."""
+    return state.pin_names + ("",) * (len(state.pins) - len(state.pin_names))
 
 
 def _pinned(pins: tuple[Any, ...], model: str) -> tuple[ViewState, ...]:

@@ -14,7 +14,7 @@ from .faces import face
 from .fields import FIELDS, MODES
 from .fits import photograph
 from .likely import FlexMode, extremes, flex_modes, posterior, source
-from .scenes import fit_title, place_words
+from .scenes import fit_title, pin_names, place_words
 from .state import Bend, Fitting, Look, Target, ViewState
 from .text import centimetres, percent_number, say
 
@@ -114,8 +114,7 @@ def pins_of(state: ViewState) -> Pins:
     keys = [(pin.target, pin.fitting, pin.bend) for pin in state.pins]
     lines = tuple(_pin_words(pin, state.look) for pin in state.pins)
     d_s = np.array([[0.0 if a == b else _between(a, b) for b in keys] for a in keys])
-    names = tuple(say("pin.name", number=number) for number in range(1, len(keys) + 1))
-    return Pins(names, lines, d_s.reshape(len(keys), len(keys)))
+    return Pins(pin_names(state), lines, d_s.reshape(len(keys), len(keys)))
 
 
 def _pin_words(pin: ViewState, look: Look) -> str:

@@ -14,6 +14,8 @@
 //   copy       {text, n, link}: to the clipboard, once for each n, answered by "copied"; a link: text is its query
 //   blink      {nodes, seconds}: one of these nodes is drawn at a time, `seconds` each; no nodes end it
 //   theme      {theme: auto | light | dark, text: 1 to 2}: kept in localStorage
+//   probe      {on}: whether the colours of a head are numbers, which the pointer may ask for
+//   probed     {n, text}: the answer to question n, shown where it was asked until the next change; "": none any more
 //   keys       {on}: whether keys without Ctrl, Alt or Meta are shortcuts
 // In what a panel shows:
 //   data-fa-copy="TEXT"                   a click, Enter or Space copies the text
@@ -33,6 +35,7 @@
 //   gone    index: Delete on a point
 //   key     "Escape"
 //   hand    true: a hand is turning the viewer
+//   probe   {n, head, vertex}: the pointer is over this vertex of this head; n counts the questions
 //   dark    whether the system is dark, when that changes
 //   copied  {n, ok}: n is 0 for data-fa-copy
 

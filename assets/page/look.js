@@ -96,6 +96,8 @@ style.textContent = `
     pointer-events: none; }
   .fa-status:empty { padding: 0; }
   .fa-spoken { position: absolute; width: 1px; height: 1px; overflow: hidden; clip-path: inset(50%); }
+  .fa-under { position: fixed; z-index: 1000; padding: 3px 9px; border-radius: 6px; background: #1d2733; color: #fff;
+    font: 13px/1.4 system-ui, sans-serif; pointer-events: none; max-width: 90vw; }
   .fa-loupe { position: fixed; z-index: 1000; width: 126px; height: 126px; border-radius: 50%; pointer-events: none;
     border: 2px solid #fff; box-shadow: 0 0 0 1px #1d2733; background-repeat: no-repeat; background-color: #cbd5e0; }
   .fa-loupe::before, .fa-loupe::after { content: ""; position: absolute; background: #c8102e; outline: 1px solid #fffc; }

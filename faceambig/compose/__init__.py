@@ -24,6 +24,7 @@ from .colours import (
     difference_colours,
     difference_legend,
     greyed,
+    over_region,
     plain,
     scale_colours,
     shown_surface,
@@ -94,6 +95,7 @@ SHOWS = ("both", "overlay", "blink", "difference")
 HIDEABLE = ("numbers", "truth", "actual")
 ERROR_SCALES = (1.0, 5.0, 10.0, 20.0)
 GHOST_OPACITY = 0.45
+FADED_IN = 0.75  # fade at which the true face is solid over the fitted one, which then goes
 MARGIN = 0.02  # metres between a drawn camera and the edge of the picture
 
 
@@ -139,8 +141,8 @@ def compose(
     titles: above the true head and above the fitted one.
     view: a key of VIEWS; "free" at `orbit` (azimuth, elevation), degrees; or "camera": the photograph itself.
     zoom: 0.5 to 4; the bar of 50 mm keeps 50 mm.
-    show: "both" side by side; "overlay", both in one place, `fade` 0 the fitted face, 1 the true one; "blink", both in
-        one place, in turn; "difference", side by side, the fitted head coloured by it.
+    show: "both" side by side; "overlay", both in one place, `fade` 0 the fitted face, 1 the true one, one of them
+        always solid; "blink", both in one place, in turn; "difference", side by side, the fitted head coloured by it.
     surface: "skin" or "clay"; or of the fitted head "difference" (d_S per vertex, mm), "depth" (`depth_change_mm`) or
         "spread" (`spread_mm` (N,), posterior sd). `shown_surface` says which is drawn, for `legend_words`: title, note.
     overlays: of OVERLAYS; "points" are those on the photograph, "marks" the same on the heads. The ghost is left out
@@ -158,6 +160,8 @@ def compose(
     look = _asked(view, show, surface, overlays, hide, fade, true_camera)
     colours = _colours(subject, face, look, spread_mm)
     heads = _heads(subject, face, look, titles, colours)
+    if (values := _values(subject, face, look, spread_mm)) is not None:
+        heads = tuple(replace(one, values_mm=values) if one.name == "fit" else one for one in heads)
     lines = () if view == "camera" else tuple(_lines(subject, face, look, picture))
     told = curve
     if curve is not None and "actual" in look.hide:
@@ -233,6 +237,15 @@ def _colours(subject: Subject, face: Face, look: Look, spread_mm: Array | None) 
     return colours if face.plausible else greyed(colours)
 
 
+def _values(subject: Subject, face: Face, look: Look, spread_mm: Array | None) -> Array | None:
+    """(N,) millimetres that the colours of the fitted head mean; None where they mean none."""
+    if look.surface == "difference":
+        return over_region(subject.model, face.gaps_mm)
+    if look.surface == "depth" and look.true_camera is not None:
+        return over_region(subject.model, depth_change_mm(subject, face, look.true_camera))
+    return spread_mm if look.surface == "spread" else None
+
+
 def _heads(
     subject: Subject, face: Face, look: Look, titles: tuple[str, str], colours: Colours
 ) -> tuple[Head, ...]:
@@ -245,9 +258,9 @@ def _heads(
     true = head(model, "true", titles[0], subject.vertices, own, slot=left)
     fit = head(model, "fit", titles[1], face.vertices, colours, slot=right, lit=not valued)
     if look.show == "overlay":
-        # Up to the middle the fitted face is whole, from there on it fades: one of the two always covers
-        true = replace(true, opacity=look.fade)
-        fit = replace(fit, opacity=min(1.0, 2.0 * (1.0 - look.fade)))
+        # The true face comes over the whole fitted one, which goes when that is whole: one of the two is always solid
+        true = replace(true, opacity=min(1.0, look.fade / FADED_IN))
+        fit = replace(fit, opacity=min(1.0, (1.0 - look.fade) / (1.0 - FADED_IN)))
         return tuple(shown for shown in (true, fit) if shown.opacity > 0)
     if look.show == "both" and "ghost" in look.overlays and not valued and look.view != "camera":
         ghost = head(

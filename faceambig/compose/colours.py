@@ -96,6 +96,13 @@ def spread_colours(model: FaceModel, sd_mm: Array) -> Colours:
     return colours
 
 
+def over_region(model: FaceModel, values: Array) -> Array:
+    """(N,) values of the evaluation region (E,) over all vertices; NaN elsewhere."""
+    every = np.full(model.n_vertices, np.nan)
+    every[slice(None) if model.evaluation is None else model.evaluation] = values
+    return every
+
+
 def _over_region(model: FaceModel, values: Colours) -> Colours:
     colours = plain(model, UNMEASURED)
     colours[slice(None) if model.evaluation is None else model.evaluation] = values

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ..arrays import Array
 from ..model import Subject
 from ..scene import Head, Photo, Scene
-from .colours import LEGENDS, Colours, difference_colours, greyed, skin
+from .colours import LEGENDS, Colours, difference_colours, greyed, over_region, skin
 from .face import Face, numbers
 from .heads import SPACING, head, named_view, pivot
 
@@ -40,7 +41,7 @@ def compose_row(
     if "truth" in hide:
         words = words[1:]
     else:
-        heads.insert(0, ("true", subject, subject.vertices, skin(subject), True))
+        heads.insert(0, ("true", subject, subject.vertices, skin(subject), True, None))
     return _scene(heads, words, faces[-1], picture, legend_words, hide, scale, note)
 
 
@@ -69,15 +70,17 @@ def compose_pins(
     return _scene(heads, words, pins[-1][1], picture, legend_words, hide, scale, note)
 
 
-Standing = tuple[str, Subject, Array, Colours, bool]  # name, whose, vertices, colours, lit
+# name, whose, vertices, colours, lit, millimetres that the colours mean
+Standing = tuple[str, Subject, Array, Colours, bool, Array | None]
 
 
 def _fitted(name: str, subject: Subject, face: Face, hide: Collection[str]) -> Standing:
     if "truth" not in hide:
         colours = difference_colours(subject.model, face.gaps_mm)
-        return name, subject, face.vertices, colours, False
+        values = over_region(subject.model, face.gaps_mm)
+        return name, subject, face.vertices, colours, False, values
     colours = skin(subject)
-    return name, subject, face.vertices, colours if face.plausible else greyed(colours), True
+    return name, subject, face.vertices, colours if face.plausible else greyed(colours), True, None
 
 
 def _scene(
@@ -93,7 +96,7 @@ def _scene(
     middle = pivot(standing[0][1].model)
     slots = SPACING * (np.arange(len(standing)) - (len(standing) - 1) / 2)
     heads: list[Head] = []
-    for (name, subject, vertices, colours, lit), (title, caption), slot in zip(
+    for (name, subject, vertices, colours, lit, values), (title, caption), slot in zip(
         standing, words, slots, strict=True
     ):
         # All turn about one pivot: a head of another model is moved so that its own stands there
@@ -102,9 +105,8 @@ def _scene(
         lines = tuple(
             line for line in caption if not ("numbers" in hide and line[1] in ("d_l", "d_s"))
         )
-        heads.append(
-            head(subject.model, name, title, placed, colours, slot=slot, caption=lines, lit=lit)
-        )
+        one = head(subject.model, name, title, placed, colours, slot=slot, caption=lines, lit=lit)
+        heads.append(replace(one, values_mm=values))
     return Scene(
         heads=tuple(heads),
         views=(named_view("front"), named_view("side")),

@@ -359,7 +359,17 @@ WRITTEN: dict[str, tuple[str, dict[str, Any]]] = {
 }
 
 
-@pytest.mark.parametrize("name", FIELDS)
+def test_pins_are_named_by_a_flag(capsys, tmp_path, drawn):
+    pins, out = "--pins=default..distance:0.6", ("--out", tmp_path / "a.png")
+    assert printed(capsys, "snapshot", *out, pins, "--pin-names", "N\u00e4her, 50%25,Far")[0] == 0
+    names = drawn[0][0].pin_names
+    assert names == ("N\u00e4her", "50%")  # one more than there are pins means nothing
+    status, *_, error = printed(capsys, "snapshot", *out, pins, "--pin-names", "x" * 31)
+    assert status == 2
+    assert "pin_names: 'xxx" in error
+
+
+@pytest.mark.parametrize("name", [name for name in FIELDS if name != "pin_names"])
 def test_every_field_of_the_state_is_a_flag(capsys, tmp_path, drawn, name):
     field = FIELDS[name]
     text, values = WRITTEN[name]

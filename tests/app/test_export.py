@@ -19,9 +19,10 @@ from faceambig.arrays import vertex_normals
 from faceambig.compose import skin
 from faceambig.io.meshes import linear
 from faceambig_app import export, faces, fits, heads, pipeline, player, stage, standalone, tracks
+from faceambig_app import told as told_of
 from faceambig_app.forms import from_json, to_json
 from faceambig_app.packing import TOLERANCE_MM, directions, packed, restored, rounded, step_of
-from faceambig_app.state import ViewState, changed
+from faceambig_app.state import DEFAULT, ViewState, changed
 from scenes import need_renderer
 
 STATE = ViewState(subject=3, distance=0.6, flex=((1, 1.5), (2, -0.5)), surface="difference")
@@ -97,6 +98,24 @@ def test_every_text_format_says_where_it_comes_from():
     assert record["software"] == "faceambig 0.1.0"
     assert record["licence"].startswith("CC0")
     assert record["model"].startswith("embedded")
+
+
+def test_pins_are_in_the_numbers_with_their_names_and_their_distances():
+    pins = [changed(DEFAULT, distance=0.6), changed(DEFAULT, subject=3)]
+    state = changed(DEFAULT, pins=pins, pin_names=["=1+1, \u05e9 \U0001f600"])
+    one, two = json.loads(export.files(state, "json")[1])["pins"]
+    kept = told_of.pins_of(state)
+    assert (one["name"], two["name"]) == ("=1+1, \u05e9 \U0001f600", "Pin 2")
+    assert [one["between_mm"], two["between_mm"]] == kept.d_s_mm.tolist()
+    assert f"{two['d_s_mm']:.1f}\u202fmm" in kept.words[1]
+    table = export.files(state, "csv")[1].decode()
+    lines = [line for line in table.splitlines() if not line.startswith("#")]
+    assert f"pin_between_mm,1-2,{one['between_mm'][1]},mm" in lines
+    assert f"pin_d_l_percent,2,{two['d_l_percent']},%" in lines
+    assert not any("1+1" in line for line in lines)  # a table's program would compute it
+    assert "pins" not in json.loads(export.files(DEFAULT, "json")[1])
+    for kind in ("csv", "json", "state", "ply", "obj", "glb"):  # all of them carry the state
+        assert export.files(state, kind)[1].count(b"pin_names"), kind
 
 
 def test_the_state_comes_back():

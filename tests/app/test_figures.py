@@ -172,7 +172,7 @@ def test_the_cursor_stands_at_the_distance_and_the_two_numbers(cm):
     tree = parsed(figures.plots(curves(), numbers))
     (line,) = [p for p in tree.iter("path") if p.get("stroke") == "var(--fa-ink)"]
     assert float(line.attrib["d"].split()[0].removeprefix("M")) == pytest.approx(x_of(cm), abs=0.06)
-    (dot,) = tree.iter("circle")
+    (dot,) = filled(tree, "circle")
     assert float(dot.attrib["cx"]) == pytest.approx(x_of(cm), abs=0.06)
     # 1.5 of 6 % from 94 up to 24; 6 of 12 mm from 222 up to 128
     assert float(dot.attrib["cy"]) == pytest.approx(94 - 70 / 4, abs=0.06)
@@ -185,9 +185,41 @@ def test_the_cursor_stands_at_the_distance_and_the_two_numbers(cm):
     assert middle == pytest.approx([x_of(cm), 222 - 94 / 2], abs=0.11)
 
 
-def test_far_away_has_no_cursor():
-    tree = parsed(figures.plots(curves(), replace(NUMBERS, distance=None)))
-    assert not list(tree.iter("circle"))
+def filled(tree: ET.Element, tag: str) -> list[ET.Element]:
+    """The marks of the cursor; those of the far-away camera are open."""
+    return [mark for mark in tree.iter(tag) if mark.get("fill") is not None]
+
+
+def far_marks(tree: ET.Element) -> dict[str, ET.Element]:
+    (group,) = [g for g in tree.iter("g") if g.get("class") == "far"]
+    return {mark.tag: mark for mark in group}
+
+
+def test_the_far_away_camera_has_marks_of_its_own_beyond_all_distances():
+    shown = replace(curves(), orthographic=(1.5, 6.0))
+    tree = parsed(figures.plots(shown, NUMBERS))
+    marks = far_marks(tree)
+    ring, square = marks["circle"].attrib, marks["rect"].attrib
+    assert float(ring["cx"]) == plots.FAR > x_of(300) + 10
+    assert float(ring["cy"]) == pytest.approx(94 - 70 / 4, abs=0.06)  # 1.5 of 6 %
+    assert float(square["x"]) + float(square["width"]) / 2 == pytest.approx(plots.FAR, abs=0.06)
+    assert float(square["y"]) + float(square["height"]) / 2 == pytest.approx(222 - 94 / 2, abs=0.06)
+    assert say("plot.far") in [text.text for text in tree.iter("text")]
+    rows = [[cell.text for cell in row] for row in tree.iter("tr")]
+    assert rows[-1] == [say("plot.far"), "1.5", "6.0"]
+    hidden = far_marks(parsed(figures.plots(shown, NUMBERS, hide=("truth",))))
+    assert set(hidden) == {"circle"}
+    tall = parsed(figures.plots(replace(shown, orthographic=(1.5, 14.0)), NUMBERS))
+    assert float(far_marks(tall)["rect"].attrib["y"]) > 128 - 4  # the axis has grown to hold it
+
+
+def test_of_the_far_away_camera_the_cursor_stands_on_its_marks():
+    shown = replace(curves(), orthographic=(1.5, 6.0))
+    now = replace(NUMBERS, distance=None, d_l_percent=1.5, d_s_mm=6.0)
+    tree = parsed(figures.plots(shown, now))
+    (dot,) = filled(tree, "circle")
+    ring = far_marks(tree)["circle"]
+    assert (dot.attrib["cx"], dot.attrib["cy"]) == (f"{plots.FAR:.1f}", ring.attrib["cy"])
 
 
 def test_curves_pass_through_their_values():

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from faceambig_app import cli, link
+from faceambig_app import cli, link, script
 from faceambig_app.commands import snapshot
 from faceambig_app.forms import command, flags, from_json, rounded, text_of, to_json, value_of
 from faceambig_app.link import Finding, query, to_digits
@@ -57,7 +57,10 @@ def comes_back(state: ViewState) -> None:
 @settings(max_examples=50)
 @given(states())
 def test_a_link_is_of_few_signs_and_near_what_it_was_made_of(state):
-    text = query(changed(state, model=DEFAULT.model))
+    of_any_signs = query(changed(state, model=DEFAULT.model))
+    assert script._QUERY.fullmatch(of_any_signs)
+    assert len(of_any_signs) < script.LONGEST
+    text = query(changed(state, model=DEFAULT.model, pin_names=()))
     assert set(text) <= set(string.ascii_letters + string.digits + "._,:-=&")
     for name, field in FIELDS.items():
         if field.kind == "number":
@@ -72,7 +75,12 @@ def test_three_digits_are_three_digits(value):
     assert len(digits) <= 3
 
 
+TWO = (DEFAULT, ViewState(distance=0.6))
 LINKS: dict[str, ViewState] = {
+    "pins=default..distance:0.6&pin_names=N%C3%A4her%20by,a%252C%20b%2525": ViewState(
+        pins=TWO, pin_names=("N\u00e4her by", "a, b%")
+    ),
+    "pins=default&pin_names=%256Eone": ViewState(pins=TWO[:1], pin_names=("none",)),
     "": DEFAULT,
     "subject=3&distance=0.6&view=side": ViewState(subject=3, distance=0.6, view="side"),
     "distance=0.305&flex=3.5": ViewState(distance=0.305, flex=((1, 3.5),)),
@@ -117,6 +125,17 @@ def test_what_means_the_same_is_one_text():
 
 # Each: a link, what it gives, what is said
 WRONG: dict[str, tuple[str, dict[str, Any], list[str]]] = {
+    "left out by the server": (
+        "subject=4&ignored=spin,lens",
+        {"subject": 4},
+        ["Unknown settings in this link were left out: spin, lens."],
+    ),
+    "left out of a newer one": (
+        "v=2&ignored=spin",
+        {},
+        ["This link was made by a newer version. Unknown settings were left out: spin."],
+    ),
+    "no word of a server's": ("ignored=<b>&subject=4", {"subject": 4}, []),
     "unknown": ("spin=3&subject=4", {"subject": 4}, ["Unknown settings in this link were left out: spin."]),
     "unknown, many": (
         "&".join(f"k{i}=1" for i in range(8)), {},

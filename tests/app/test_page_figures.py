@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from faceambig.scene import Curves, Legend, Numbers, Photo, View
-from faceambig_app import figures, photograph, plots, style
+from faceambig_app import figures, photograph, plots, plottable, style
 from faceambig_app.text import say
 from scenes import legend as a_legend
 from scenes import photo as egg
@@ -128,9 +128,10 @@ def test_the_table_holds_the_curves_and_is_closed():
     (details,) = tree.iter("details")
     assert "open" not in details.attrib
     rows = [[cell.text for cell in row] for row in tree.iter("tr")][1:]
-    assert len(rows) == plots.MOST_ROWS
+    assert len(rows) == plottable.MOST_ROWS + 1
     assert rows[0] == ["20", f"{curves.d_l_percent[0]:.1f}", f"{curves.d_s_mm[0]:.1f}", "1"]
-    assert rows[-1][0] == "300"
+    assert rows[-2][0] == "300"
+    assert rows[-1] == [say("plot.far"), "9.0", "9.0", None]
     assert all(cell.get("scope") for cell in tree.iter("th"))
 
 
@@ -301,7 +302,7 @@ def test_the_spectrum_has_a_bar_a_mode_in_proportion():
 def test_the_matrix_of_pins_is_a_table_with_heads_on_both_sides():
     d_s = np.array([[0.0, 2.1], [2.1, 0.0]])
     tree = parsed(figures.pin_matrix(("30 cm", HOSTILE), d_s))
-    rows = [[(cell.text or "") for cell in row] for row in tree.iter("tr")]
+    rows = [["".join(cell.itertext()) for cell in row] for row in tree.iter("tr")]
     assert rows == [["", "30 cm", HOSTILE], ["30 cm", "", "2.1"], [HOSTILE, "2.1", ""]]
     assert [th.attrib["scope"] for th in tree.iter("th")] == ["col", "col", "row", "row"]
 

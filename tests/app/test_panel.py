@@ -10,10 +10,10 @@ from unittest.mock import MagicMock
 import numpy as np
 
 from faceambig_app import figures
-from faceambig_app.actions import ACTIONS
+from faceambig_app.actions import ACTIONS, rename, unpin
 from faceambig_app.panel import Change, Panel
 from faceambig_app.panel.export import Shown
-from faceambig_app.state import DEFAULT, ViewState, changed
+from faceambig_app.state import DEFAULT, ViewState, changed, names_of_pins
 
 
 class Widget:
@@ -22,7 +22,7 @@ class Widget:
     def __init__(self, label: str, *_: Any, **__: Any) -> None:
         self.label = label
         self.value: Any = None
-        self.disabled, self._marks = False, ()
+        self.disabled, self._marks, self.visible = False, (), True
         self._impl = SimpleNamespace(uuid=label)
 
     def on_update(self, listener: Any) -> None:
@@ -53,6 +53,8 @@ class Gui:
     def __getattr__(self, name: str) -> Any:
         def add(label: str = "", *arguments: Any, **options: Any) -> Widget:
             widget = Widget(label, *arguments, **options)
+            if name == "add_text":
+                widget.value = arguments[0]
             return self.widgets.setdefault(label, widget) if label else widget
 
         return add
@@ -164,6 +166,38 @@ def changed_by(action: str, state: ViewState) -> ViewState:
     change = ACTIONS[action].change
     assert change is not None
     return change(state)
+
+
+def test_a_pin_keeps_its_name_while_others_come_and_go():
+    faces = [changed(DEFAULT, distance=metres) for metres in (0.3, 0.6, 1.2, 2.0, 2.4)]
+    state = changed(DEFAULT, pins=faces, pin_names=["a", "", "c", "d", "e"])
+    assert changed_by("pin", changed(state, distance=0.3)).pin_names == ("", "c", "d", "e", "a")
+    other = changed_by("pin", changed(state, distance=0.5))  # the oldest goes
+    assert names_of_pins(other) == ("", "c", "d", "e", "")
+    assert names_of_pins(unpin(2)(state)) == ("a", "", "d", "e")
+    assert unpin(9)(state) == rename(9, "x")(state) == state
+    assert changed_by("pin_distances", state).pin_names == ()
+    assert changed_by("unpin", state) == DEFAULT
+
+
+def test_a_name_is_typed_beside_its_pin_and_follows_the_state():
+    state = changed(DEFAULT, pins=[DEFAULT, changed(DEFAULT, distance=0.6)], pin_names=["", "Near"])
+    panel, gui, told, _ = panel_of(state)
+    first, second, third = (gui.widgets[f"Name of pin {number}"] for number in (1, 2, 3))
+    assert [w.visible for w in (first, second, third)] == [True, True, False]
+    assert (first.value, second.value) == ("", "Near")
+    first.hears("My \u202eface \x07" + "x" * 40)
+    assert told[-1](state).pin_names == ("My face " + "x" * 22, "Near")
+    second.hears("")
+    assert told[-1](state).pin_names == ()
+    second.value = "Near "  # the next word is being typed
+    panel.show(state)
+    assert second.value == "Near "
+    second.value = "Near" + "x" * 40  # too long: what is kept is shown
+    panel.show(changed(state, pin_names=["", "Near" + "x" * 26]))
+    assert second.value == "Near" + "x" * 26
+    panel.show(changed(state, pins=[DEFAULT]))
+    assert not second.visible
 
 
 def test_pins_are_listed_with_their_distances_and_an_empty_list_says_what_to_do():

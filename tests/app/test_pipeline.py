@@ -550,6 +550,11 @@ def test_pins_stand_in_the_row_with_their_names_and_are_compared():
     assert "30\u202fcm" not in pins_of(hidden).words[0]
     assert "mm" not in pins_of(hidden).words[0]
     assert pins_of(DEFAULT).d_s_mm.shape == (0, 0)
+    named = changed(state, pin_names=["", "N\u00e4her <b>"])
+    assert [head.title.split(",")[0] for head in frame(named).scene.heads] == [
+        "Pin 1", "N\u00e4her <b>", "Pin 3",
+    ]  # fmt: skip
+    assert pins_of(named).names == ("Pin 1", "N\u00e4her <b>", "Pin 3")
 
 
 def test_what_a_slider_says_is_its_mode():

@@ -12,6 +12,7 @@ import viser
 
 from faceambig_app import script
 from faceambig_app.script import (
+    LONGEST,
     Click,
     Copied,
     Dark,
@@ -20,6 +21,7 @@ from faceambig_app.script import (
     Hello,
     Key,
     Point,
+    Probe,
     is_dark,
     read_report,
 )
@@ -48,6 +50,7 @@ HELLO = {
         ({"hand": True}, Hand(True)),
         ({"dark": True}, Dark(True)),
         ({"copied": {"n": 2, "ok": False}}, Copied(2, False)),
+        ({"probe": {"n": 3, "head": "fit", "vertex": 77}}, Probe(3, "fit", 77)),
     ],
 )
 def test_reports_are_read(sent: object, read: script.Report) -> None:
@@ -69,6 +72,10 @@ def test_reports_are_read(sent: object, read: script.Report) -> None:
         '{"gone": 1, "dark": true}',
         '{"other": 1}',
         '{"key": "Enter"}',
+        '{"probe": {"n": 0, "head": "fit", "vertex": 1}}',
+        '{"probe": {"n": 1, "head": "fit", "vertex": -1}}',
+        '{"probe": {"n": 1, "head": "' + "x" * 65 + '", "vertex": 1}}',
+        '{"probe": {"n": 1, "head": 1, "vertex": 1}}',
         '{"dark": 1}',
         '{"click": {"x": 1}}',
         '{"click": {"x": NaN, "y": 1}}',
@@ -76,7 +83,7 @@ def test_reports_are_read(sent: object, read: script.Report) -> None:
         '{"click": {"x": -1, "y": 1}}',
         '{"click": {"x": "1", "y": 1}}',
         '{"point": {"index": 1.5, "x": 1, "y": 1, "done": true}}',
-        json.dumps({"hello": HELLO | {"query": "x" * 2001}}),
+        json.dumps({"hello": HELLO | {"query": "x" * (LONGEST + 1)}}),
         json.dumps({"hello": HELLO | {"theme": "blue"}}),
         json.dumps({"hello": HELLO | {"text": 3}}),
         "[" * 4000,
@@ -123,7 +130,7 @@ def test_one_line_for_nonsense_and_the_rest_is_heard(caplog: pytest.LogCaptureFi
     [
         ("address", "a b", "query 'a b'"),
         ("address", "a#b", "query 'a#b'"),
-        ("address", "a" * 2001, "at most 2000"),
+        ("address", "a" * (LONGEST + 1), f"at most {LONGEST}"),
         ("theme", "blue", "theme 'blue': auto, light or dark"),
     ],
 )

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from faceambig_app.fields import canonical
+from faceambig_app.fields import canonical, tidy
 from faceambig_app.state import (
     DEFAULT,
     FIELDS,
@@ -20,6 +20,7 @@ from faceambig_app.state import (
     Target,
     ViewState,
     changed,
+    names_of_pins,
     short,
 )
 from states import alone, states, values
@@ -64,7 +65,11 @@ def test_json_that_is_no_state_is_refused(text, words):
 
 
 @settings(max_examples=50)
-@given(states(), st.sampled_from(sorted({*FIELDS} - {"view", "orbit", "pins", "model"})), st.data())
+@given(
+    states(),
+    st.sampled_from(sorted({*FIELDS} - {"view", "orbit", "pins", "pin_names", "model"})),
+    st.data(),
+)
 def test_a_change_changes_its_field_alone(state, name, data):
     value = data.draw(values(FIELDS[name]))
     after = changed(state, **{name: value})
@@ -88,11 +93,11 @@ PARTS = {
     "fitting": {"distance", "camera", "modes", "prior", "box"},
     "bend": {"flex", "flex_at", "draw", "extreme"},
     "look": {"show", "surface", "view", "orbit", "zoom", "overlays", "error_scale", "fade", "hide"},
-    "page": {"pins", "theme", "text", "flex_from"},
+    "page": {"pins", "pin_names", "theme", "text", "flex_from"},
 }  # fmt: skip
 OTHER = {
     "model": "elsewhere.npz", "subject": "photo", "flex": ((2, 1.0),), "draw": 0, "extreme": 1, "orbit": (1.0, 2.0),
-    "overlays": ("rays",), "hide": ("truth",), "pins": (DEFAULT,),
+    "overlays": ("rays",), "hide": ("truth",), "pins": (DEFAULT,), "pin_names": (),
 }  # fmt: skip
 
 
@@ -234,6 +239,14 @@ def test_what_means_the_same_is_one_value(name, given, kept):
         ("pins", ["x"], "pins: 'x' is not a ViewState"),
         ("pins", [DEFAULT] * 6, "pins: 6 of them; give at most 5"),
         ("pins", DEFAULT, "pins: ViewState.* is not a tuple, a list or a set"),
+        ("pin_names", ["x"] * 6, "pin_names: 6 of them; give at most 5"),
+        ("pin_names", "x", "pin_names: 'x' is not a tuple, a list or a set"),
+        ("pin_names", {"x"}, "pin_names: {'x'} is not a tuple or a list"),
+        ("pin_names", [1], "pin_names: 1 is not a text"),
+        ("pin_names", ["x" * 31], "pin_names: 'x+' is longer than 30 characters"),
+        ("pin_names", ["\u202eevil"], r"pin_names: '\\u202eevil' has characters no name has"),
+        ("pin_names", ["\ud800"], r"pin_names: '\\ud800' has characters no name has"),
+        ("pin_names", ["\x07"], r"pin_names: '\\x07' has characters no name has"),
         ("v", 2, r"v: 2 is not the format that this program reads \(1\)"),
         ("v", True, r"v: True is not the format that this program reads \(1\)"),
     ],
@@ -251,6 +264,21 @@ def test_a_pin_is_the_face_alone(state):
     assert pin.look == DEFAULT.look
     assert short(pin) == pin
     assert changed(state, pins=[state]).pins == (pin,)
+
+
+def test_names_of_pins_have_one_space_between_words_and_end_with_the_pins():
+    state = changed(DEFAULT, pins=[DEFAULT] * 2, pin_names=[" Near \n by ", "", "Gone"])
+    assert state.pin_names == ("Near by",)
+    assert names_of_pins(state) == ("Near by", "")
+    assert changed(state, pins=()) == DEFAULT
+    assert changed(DEFAULT, pin_names=["Near"]) == DEFAULT
+
+
+@given(st.text(max_size=60))
+def test_what_is_typed_is_tidied_into_a_name(text):
+    name = tidy(text)
+    assert changed(DEFAULT, pins=[DEFAULT], pin_names=[name]).pin_names == ((name,) if name else ())
+    assert tidy(name) == name
 
 
 def test_pins_are_of_the_model_of_their_state():

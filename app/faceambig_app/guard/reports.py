@@ -10,7 +10,7 @@ import viser
 
 from .door import Door, log_line
 
-MAX_REPORT = 4096  # characters
+MAX_REPORT = 8192  # characters: an address of 7000 among them
 
 _LISTENER = "faceambig_listener"  # on viser's record of the control, so that it goes with it
 

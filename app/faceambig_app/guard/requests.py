@@ -11,6 +11,7 @@ import sys
 from websockets import Headers
 from websockets.http11 import Request, Response
 
+from ..link import IGNORED, ignored, told_ignored
 from .door import Door, ServeError
 
 HEADERS = {
@@ -38,8 +39,7 @@ def answer(door: Door, request: Request) -> Response | None:
     if path not in ("/", "/index.html"):
         return reply(404, "There is one page, /.")
     pieces = query.split("&") if query else []
-    # Compared as written: viser also obeys websocket= and playbackPath=, in any spelling.
-    kept = [piece for piece in pieces if piece.partition("=")[0] in door.keys]
+    kept = _ours(door, pieces)
     if kept != pieces:
         return reply(303, "", Location="/?" + "&".join(kept) if kept else "/")
     zipped = "gzip" in request.headers.get("Accept-Encoding", "")
@@ -49,6 +49,24 @@ def answer(door: Door, request: Request) -> Response | None:
         **{"Content-Type": "text/html; charset=utf-8", "Vary": "Accept-Encoding"},
         **({"Content-Encoding": "gzip"} if zipped else {}),
     )
+
+
+def _ours(door: Door, pieces: list[str]) -> list[str]:
+    """The pieces of a query that may stand in the page's address; last the names of the others, for the page to tell.
+
+    Names are compared as written: viser also obeys websocket= and playbackPath=, in any spelling.
+    """
+    kept: list[str] = []
+    others: list[str] = []
+    for piece in pieces:
+        name, _, value = piece.partition("=")
+        if name in door.keys:
+            kept.append(piece)
+        elif name == IGNORED:
+            others += told_ignored(value)
+        elif piece:
+            others.append(name)
+    return [*kept, f"{IGNORED}={ignored(others)}"] if others else kept
 
 
 def dress(door: Door, request: Request, response: Response) -> None:

@@ -6,8 +6,9 @@ from collections.abc import Callable
 
 import viser
 
-from ..actions import unpin, visit
-from ..fields import PINS
+from ..actions import rename, unpin, visit
+from ..fields import PIN_NAME_LENGTH, PINS
+from ..state import ViewState, names_of_pins
 from ..text import say
 from .widgets import Change, Widgets
 
@@ -29,8 +30,19 @@ def _build_pin(w: Widgets, number: int) -> None:
     does: dict[str, Callable[[int], Change]] = {say("pin.visit"): visit, say("pin.remove"): unpin}
     group = w.gui.add_button_group(say("pin.name", number=number + 1), tuple(does), visible=False)
     group.on_click(w.heard(lambda option: does[option](number)))
+    hint = say("pin.rename_hint", most=PIN_NAME_LENGTH)
+    name = w.gui.add_text(say("pin.rename", number=number + 1), "", visible=False, hint=hint)
+    name.on_update(w.heard(lambda text: rename(number, text)))
 
-    def seen(here: bool) -> None:
-        group.visible = here
+    def now(state: ViewState) -> tuple[bool, str, str]:
+        here = number < len(state.pins)
+        # A space just typed is left for the next word
+        return here, names_of_pins(state)[number] if here else "", " ".join(name.value.split())
 
-    w.watch(lambda state: number < len(state.pins), seen)
+    def seen(found: tuple[bool, str, str]) -> None:
+        here, kept, typed = found
+        group.visible = name.visible = here
+        if typed != kept:
+            name.value = kept
+
+    w.watch(now, seen)
