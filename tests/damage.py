@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 TOKENS = (
     b"", b"0", b"-1", b"1e999", b"-1e-999", b"NaN", b"Infinity", b"null", b"true", b"9" * 20, b"9" * 5000, b"1" * 310,
     b"[", b"]", b"{", b"}", b'"', b"[" * 2000, b'{"a":' * 2000, b",", b":", b"\n", b"\r", b"\x00", b"\xff\xfe",
-    b"\xef\xbb\xbf", b"\xed\xa0\x80", b"\\u0000", b"\\ud800", b"&", b"=", b"%", b"%ff", b"..", b"none", b"\xe2\x80\xae", b"\x1b[2J",
+    b"\xef\xbb\xbf", b"\xed\xa0\x80", b"\\u0000", b"\\ud800", b"&", b"=", b"%", b"%ff",
+    b"..", b"none", b"\xe2\x80\xae", b"\x1b[2J",
 )  # fmt: skip
 
 Change = tuple[int, int, bytes]  # where, how many bytes are taken out, what comes instead

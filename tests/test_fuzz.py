@@ -1,7 +1,7 @@
 """Every reader of what comes from outside, given damage: a value, or one short line; never anything else, and no flood.
 
-The numbers of cases are those of the usual profile; HYPOTHESIS_PROFILE=long has fifty times as many, others in every
-run. Files of models are damaged in their own tests: test_npz, test_basel, test_statismo, test_eos, test_flame, test_gnm.
+The numbers of cases are those of the usual profile; HYPOTHESIS_PROFILE=long has fifty times as many, others every
+time. Files of models are damaged in their own tests: test_npz, test_basel, test_eos, test_flame and others.
 """
 
 from __future__ import annotations

@@ -9,6 +9,7 @@ import asyncio
 import gc
 import signal
 import threading
+import warnings
 from types import FrameType
 from typing import Any
 
@@ -120,6 +121,8 @@ def serve(host: str, port: int) -> int:
         status = 130 if number == signal.SIGINT else 0
         stopped.set()
 
+    # viser says it of every browser that leaves while something is drawn for it, with lines of its own source
+    warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
     for number in (signal.SIGINT, signal.SIGTERM):  # before anybody can know that the page is there
         signal.signal(number, stop)
     page = Page(host, port)
