@@ -91,9 +91,11 @@ class Person(threading.Thread):
             try:
                 wire = Wire(self._port, self._query)
                 self.did["came"] += 1
-                if not wire.rests(PATIENCE):
+                if wire.rests(PATIENCE):
+                    self._visit(wire)
+                else:
                     self.errors.append("no first frame")
-                self._visit(wire)
+                    wire.close()
             except GONE as error:
                 self.did["was cut off"] += 1
                 if not self._stopped.is_set() and "nonsense" not in self.did:
@@ -244,8 +246,8 @@ def table(samples: list[dict[str, float]]) -> list[str]:
     for name in COUNTED:
         values = np.array([sample[name] for sample in samples])
         tenth = max(1, int(late.sum()) // 10)
-        first = float(np.nanmedian(values[late][:tenth]))
-        last = float(np.nanmedian(values[late][-tenth:]))
+        known = values[late & np.isfinite(values)]  # an answer that never came is told below
+        first, last = (float(np.median(part)) for part in (known[:tenth], known[-tenth:]))
         rate, error = slope(seconds, values)
         lines.append(f"{name:<14}{first:>11.1f}{last:>12.1f}{rate:>+16.1f}{error:>9.1f}")
     waits = np.array([sample["answer_ms"] for sample in samples])
