@@ -22,7 +22,9 @@ from faceambig.model import FaceModel
 
 # The same examples on every run and machine: a failure is a change of the code, never of the weather
 settings.register_profile("ci", deadline=None, derandomize=True, max_examples=100)
-settings.load_profile("ci")
+# By hand, for the readers of files: fifty times as many examples, and others in every run
+settings.register_profile("long", deadline=None, max_examples=5000, print_blob=True)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 
 NO_ICT = (
     "no ICT-FaceKit: FACEAMBIG_ICT names no folder, ../shared/tools/unpack_ict.sh finds no archive"

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.io
-from hypothesis import given, settings
+from hypothesis import given
 
 import faceambig.io as fio
+from damage import cases
 from faceambig.errors import AssetError
 from faceambig.io.matlab import read_matlab
 from model_files import EYES, damages, drawn, eyes_of, read_damaged, write_basel, write_farkas
@@ -223,7 +224,7 @@ def whole(request, tmp_path_factory) -> bytes:
     return write_basel(path, SMALL, compressed=request.param).read_bytes()
 
 
-@settings(max_examples=150)
+@cases(150)
 @given(damage=damages(2_500))
 def test_damage_is_an_asset_error_or_another_number(whole, tmp_path_factory, damage):
     read_damaged(tmp_path_factory.getbasetemp() / "damaged.mat", whole, damage)

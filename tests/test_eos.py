@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 import faceambig.io as fio
+from damage import cases
 from faceambig.errors import AssetError
 from model_files import (
     EYES,
@@ -186,7 +187,7 @@ def whole(tmp_path_factory) -> bytes:
     ).read_bytes()
 
 
-@settings(max_examples=200)
+@cases(200)
 @given(damage=damages(8_000))
 def test_damage_is_an_asset_error_or_another_number(whole, tmp_path_factory, damage):
     assert len(whole) > 8_000  # all the heads; behind them are coordinates of the texture

@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 import faceambig.io as fio
+from damage import cases
 from faceambig.errors import AssetError
 from faceambig.io.between import points_between
 from model_files import Drawn, damages, drawn, flame_arrays, pickled, read_damaged, write_flame
@@ -284,7 +285,7 @@ def whole(request, tmp_path_factory) -> tuple[str, bytes]:
     return name, write_flame(tmp_path_factory.mktemp("flame") / name, SMALL, protocol).read_bytes()
 
 
-@settings(max_examples=60)
+@cases(60)
 @given(damage=damages(5_000))
 def test_damage_is_an_asset_error_or_another_number(whole, tmp_path_factory, damage):
     read_damaged(tmp_path_factory.getbasetemp() / f"damaged_{whole[0]}", whole[1], damage)

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 import faceambig.io as fio
+from damage import cases
 from faceambig.errors import AssetError
 from faceambig.io.files import MAX_BYTES
 from model_files import (
@@ -152,7 +153,7 @@ def whole(tmp_path_factory) -> bytes:
     return write_gnm(tmp_path_factory.mktemp("gnm") / "gnm_head.npz", SMALL).read_bytes()
 
 
-@settings(max_examples=150)
+@cases(150)
 @given(damage=damages(10_000))
 def test_damage_is_an_asset_error_or_another_number(whole, tmp_path_factory, damage):
     read_damaged(tmp_path_factory.getbasetemp() / "damaged_gnm.npz", whole, damage)

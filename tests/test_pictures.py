@@ -10,10 +10,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image, ImageOps
 
+from damage import cases
 from faceambig import AssetError
 from faceambig.io import pictures
 from faceambig.io.pictures import Picture, is_picture, picture_size, read_picture
@@ -206,18 +207,18 @@ def test_a_truncated_picture_is_named(tmp_path, kind, share):
     assert str(tmp_path) not in str(error.value)
 
 
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@cases(150)
 @given(
     kind=st.sampled_from(sorted(WHOLE)),
     changes=st.lists(st.tuples(st.integers(0, 1500), st.integers(0, 255)), max_size=6),
     length=st.integers(0, 4000),
 )
-def test_damage_gives_a_picture_or_one_line(tmp_path, kind, changes, length):
+def test_damage_gives_a_picture_or_one_line(tmp_path_factory, kind, changes, length):
     data = bytearray(WHOLE[kind][:length])
     for at, value in changes:
         if at < len(data):
             data[at] = value
-    path = tmp_path / "a.jpg"
+    path = tmp_path_factory.getbasetemp() / "a.jpg"
     path.write_bytes(data)
     said = ""
     try:

@@ -7,9 +7,10 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 import faceambig.io as fio
+from damage import cases
 from faceambig.errors import AssetError
 from model_files import EYES, HEAD_AT, damages, drawn, eyes_of, read_damaged, write_statismo
 
@@ -241,7 +242,7 @@ def whole(tmp_path_factory) -> bytes:
     ).read_bytes()
 
 
-@settings(max_examples=200)
+@cases(200)
 @given(damage=damages(20_000))
 def test_damage_is_an_asset_error_or_another_number(whole, tmp_path_factory, damage):
     read_damaged(tmp_path_factory.getbasetemp() / "damaged.h5", whole, damage)

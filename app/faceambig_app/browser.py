@@ -20,7 +20,7 @@ from .fits import model
 from .forms import command
 from .glide import Glide
 from .link import query
-from .notices import from_query
+from .notices import cause, from_query
 from .orders import Orders
 from .own_room import OwnRoom
 from .panel import Change, Panel
@@ -288,8 +288,8 @@ class Browser:
 
     def refuse(self, error: BaseException) -> None:
         """Say why a state could not be drawn; the last good frame stays."""
-        log.warning("a frame failed: %s", " ".join(str(error).split())[:200])
-        self.notice(say("error.failed", cause=str(error)))
+        log.warning("a frame failed: %s", cause(error))
+        self.notice(say("error.failed", cause=cause(error)))
         self._loop.call_soon_threadsafe(
             self._loop.call_later, REST, self._say_again, self.room.state
         )

@@ -17,7 +17,7 @@ from .faces import curve_key
 from .own import OwnFrame, OwnPhoto, own_frame, told_distance
 from .panel import Panel
 from .pipeline import Frame, frame, plots_of
-from .scenes import photo_jpeg
+from .scenes import photo_jpeg, whole
 from .stage import Stage
 from .state import ViewState
 from .style import text_size
@@ -89,6 +89,8 @@ class Display:
     def _send(self, html: Contents, scene: Scene | None = None, draft: bool = False) -> None:
         if self._gone():  # while this was computed
             return
+        if scene is not None:
+            whole(scene)
         with self._client.atomic():
             if scene is not None:
                 self._stage.show(scene, draft)

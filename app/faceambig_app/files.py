@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
@@ -42,8 +43,15 @@ def write_pairs(files: Iterable[tuple[Path, bytes]]) -> None:
                     made = TemporaryDirectory(dir=path.parent, prefix=".faceambig-")
                     beside[path.parent] = Path(stack.enter_context(made))
                 waiting[path] = beside[path.parent] / path.name
-                waiting[path].write_bytes(data)
+                _write_through(waiting[path], data)
             for path, whole in waiting.items():
                 whole.replace(path)
     except OSError as error:
         raise ValueError(f"out: cannot write {str(path)!r}: {error.strerror}") from error
+
+
+def _write_through(path: Path, data: bytes) -> None:
+    """A new file, on the disk when this returns: some systems tell only then that there is no room for it."""
+    path.write_bytes(data)
+    with path.open("rb+") as file:
+        os.fsync(file.fileno())

@@ -106,9 +106,9 @@ def from_json(text: str | bytes) -> ViewState:
     except RecursionError:
         raise ValueError("state: nested too deeply") from None
     except msgspec.ValidationError as error:
-        raise ValueError(_one_line(str(error))) from error
+        raise ValueError(one_line(str(error))) from error
     except (msgspec.DecodeError, UnicodeError) as error:
-        raise ValueError(f"state: not JSON ({_one_line(str(error))})") from error
+        raise ValueError(f"state: not JSON ({one_line(str(error))})") from error
 
 
 def flags(state: ViewState) -> list[str]:
@@ -199,6 +199,7 @@ def rounded(value: float) -> float:
     return float(f"{value:.3g}") if math.isfinite(value) else value
 
 
-def _one_line(words: str) -> str:
+def one_line(words: str) -> str:
+    """Words of anybody on one line of at most 200 characters that can be shown."""
     line = " ".join("".join(c if c.isprintable() else " " for c in words).split())
     return line if len(line) <= 200 else f"{line[:197]}..."

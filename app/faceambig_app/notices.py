@@ -12,6 +12,7 @@ from .state import DEFAULT, ViewState, changed
 from .text import say
 
 NAMED = 5  # names of settings in one notice
+LONGEST_CAUSE = 200  # characters of an error in one notice
 
 
 def from_query(
@@ -68,6 +69,21 @@ def words(finding: Finding) -> str:
             return say("link.model", value=value, used=DEFAULT.model)
         case "photo":
             return say("link.photo")
+
+
+def cause(error: BaseException) -> str:
+    """Why something failed, as a short sentence of one line: an error's own words, or what it is called."""
+    told = getattr(error, "strerror", None) or str(
+        error
+    )  # of a file the cause, not where on this machine it lies
+    line = " ".join("".join(c if c.isprintable() else " " for c in str(told)).split())[
+        :LONGEST_CAUSE
+    ]
+    if (
+        not isinstance(error, ValueError | RuntimeError | OSError) or not line
+    ):  # "'a'" alone says nothing
+        line = f"{type(error).__name__}: {line}" if line else type(error).__name__
+    return line if line.endswith((".", "!", "?")) else f"{line}."
 
 
 def _names(names: tuple[str, ...]) -> str:

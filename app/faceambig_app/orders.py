@@ -84,7 +84,7 @@ class Orders:
             for order in self._line:
                 order.stopped = True
             self._changed.notify()
-        self._thread.join(timeout=2.0)
+        self._thread.join(timeout=0.5)
 
     def _run(self) -> None:
         while (order := self._next()) is not None:

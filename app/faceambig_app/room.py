@@ -22,6 +22,7 @@ from .state import ViewState
 log = logging.getLogger("faceambig")
 
 REST = 0.2  # seconds without a change before the full mesh is drawn
+FAREWELL = 1.0  # seconds for what is being computed when the page is closed
 WORKERS = 2  # measured: one was not better than two, and Python holds the interpreter's lock beyond
 
 
@@ -113,12 +114,13 @@ class Dispatcher:
             self._changed.notify()
 
     def close(self) -> None:
-        """Stop the workers; a room being served is finished first."""
+        """Stop the workers; a room being served is finished first, if that takes no longer than FAREWELL."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()
+        end = time.monotonic() + FAREWELL
         for thread in self._threads:
-            thread.join(timeout=2.0)
+            thread.join(timeout=max(0.0, end - time.monotonic()))
 
     def _work(self) -> None:
         while True:

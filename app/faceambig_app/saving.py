@@ -14,7 +14,7 @@ import viser
 from . import own_export
 from .export import files
 from .guard import send_file
-from .notices import from_file
+from .notices import cause, from_file
 from .orders import Orders, Progress, Work
 from .own import OwnPhoto
 from .panel.export import Shown
@@ -119,8 +119,8 @@ class Saving:
 
     def failed(self, error: Exception) -> None:
         """Say why there is no file."""
-        log.warning("an export failed: %s", " ".join(str(error).split())[:200])
-        self._tell(Shown(), partial(self._notice, say("export.failed", cause=str(error))))
+        log.warning("an export failed: %s", cause(error))
+        self._tell(Shown(), partial(self._notice, say("export.failed", cause=cause(error))))
 
     def _tell(self, shown: Shown, also: Callable[[], None] | None = None) -> None:
         number = self._number

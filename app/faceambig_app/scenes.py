@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 
+import numpy as np
+
 from faceambig.arrays import Array
 from faceambig.compose import (
     Face,
@@ -215,3 +217,12 @@ def _note(state: ViewState) -> str:
         subject=taken.subject.name,
         noise=noise,
     )
+
+
+def whole(scene: Scene) -> Scene:
+    """`scene`, if all its heads, points and lines are finite; ValueError: a browser would show nothing at all."""
+    parts = [head.vertices for head in scene.heads]
+    parts += [mark.points for mark in scene.marks] + [line.segments for line in scene.lines]
+    if not all(np.isfinite(part).all() for part in parts):
+        raise ValueError(say("error.not_finite"))
+    return scene

@@ -11,6 +11,7 @@ import msgspec
 import viser
 from msgspec import UNSET, Meta, Struct, UnsetType
 
+from .forms import one_line
 from .guard import add_reports, data_html, log_line
 
 Theme = Literal["auto", "light", "dark"]
@@ -111,7 +112,7 @@ def read_report(text: str) -> Report:
     try:
         envelope = _decoder.decode(text)
     except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
-        raise ValueError(f"report: {error}") from None
+        raise ValueError(f"report: {one_line(str(error))}") from None
     given = [
         (name, value)
         for name in envelope.__struct_fields__

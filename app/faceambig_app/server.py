@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import asyncio
 import gc
+import re
 import signal
 import threading
+import warnings
 from types import FrameType
 from typing import Any
 
@@ -26,6 +28,8 @@ from .room import Dispatcher
 from .stage import FAR, FIRST_FOV, FIRST_POSITION, NEAR
 from .state import DEFAULT
 from .text import say
+
+CLOSED = re.compile("Queued a .* on a closed connection")  # a warning of viser
 
 
 class Page:
@@ -120,6 +124,8 @@ def serve(host: str, port: int) -> int:
         status = 130 if number == signal.SIGINT else 0
         stopped.set()
 
+    # viser says it of every browser that leaves while something is drawn for it, with lines of its own source
+    warnings.filterwarnings("ignore", CLOSED.pattern, UserWarning)
     for number in (signal.SIGINT, signal.SIGTERM):  # before anybody can know that the page is there
         signal.signal(number, stop)
     page = Page(host, port)

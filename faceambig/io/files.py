@@ -65,4 +65,8 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     with tempfile.TemporaryDirectory(dir=file.parent, prefix=".faceambig-") as folder:
         whole = Path(folder) / file.name
         yield whole
+        with whole.open(
+            "rb+"
+        ) as written:  # some systems tell only here that there is no room for it
+            os.fsync(written.fileno())
         whole.replace(file)

@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from damage import cases
 from faceambig_app import cli, link, script
 from faceambig_app.commands import snapshot
 from faceambig_app.forms import command, flags, from_json, rounded, text_of, to_json, value_of
@@ -25,7 +26,7 @@ PARSER = cli.parser()
 PHOTO = "This link needs your photo."
 
 
-@settings(max_examples=200)
+@cases(200)
 @given(states())
 def test_a_state_comes_back_from_link_file_flags_and_pins(state):
     comes_back(state)
@@ -224,7 +225,7 @@ def test_a_link_may_name_the_models_of_the_page():
     assert query(ViewState(model="a b/ü=1&2.npz")) == "model=a%20b%2F%C3%BC%3D1%262.npz"
 
 
-@settings(max_examples=300)
+@cases(300)
 @given(st.text() | st.lists(st.sampled_from([
     *FIELDS, "v", "spin", "=", "&", "?", "..", ",", ":", "-", "1", "2.5", "1e9", "nan", "none", "default",
     "%", "%41", "%ff", "+", "photo", "free", "rays", "\0", "é",
@@ -305,7 +306,7 @@ json_values = st.recursive(
 )  # fmt: skip
 
 
-@settings(max_examples=300)
+@cases(300)
 @given(st.text() | st.binary() | st.dictionaries(
     st.sampled_from([*FIELDS, "v", "spin"]), json_values, max_size=3).map(json.dumps))  # fmt: skip
 def test_any_text_is_a_state_or_a_short_line(text):

@@ -115,7 +115,7 @@ def test_an_error_is_a_red_line_and_the_tab_is_free_again(desk):
     desk.saving.failed(ValueError("face: 'true' is hidden in this state"))
     desk.loop.run()
     assert desk.shown[-1] == Shown()
-    assert desk.notices == ["No file was made: face: 'true' is hidden in this state"]
+    assert desk.notices == ["No file was made: face: 'true' is hidden in this state."]
 
 
 def test_a_browser_that_left_is_shown_nothing_and_its_order_is_taken_back(desk):
