@@ -214,9 +214,9 @@ def forget(tiny: Tiny) -> None:
     ("host", "port", "words"),
     [
         ("nosuch.invalid", 0, "host 'nosuch.invalid'"),
-        ("0.0.0.0", 0, "this machine only"),
-        ("192.0.2.1", 0, "this machine only"),
-        ("::", 0, "this machine only"),
+        ("0.0.0.0", 0, "needs a token"),
+        ("192.0.2.1", 0, "port 0 at 192.0.2.1"),
+        ("::", 0, "needs a token"),
         ("127.0.0.1", 70000, "port 70000"),
         ("127.0.0.1", -1, "port -1"),
     ],
