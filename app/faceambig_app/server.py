@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import gc
+import math
 import signal
 import sys
 import threading
@@ -120,6 +121,8 @@ def refusal(control: Any, asked: object, put: object) -> str:
     low, high = getattr(control, "min", None), getattr(control, "max", None)
     if (
         isinstance(asked, (int, float))
+        and not isinstance(asked, bool)
+        and math.isfinite(asked)
         and isinstance(put, (int, float))
         and low is not None
         and high is not None
