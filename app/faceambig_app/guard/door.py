@@ -13,18 +13,19 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+# First of all: what the others take from viser is there
+from .pinned import VISER, ServeError
+
 if TYPE_CHECKING:
     from .access import Access
     from .page import Page
     from .sessions import Limits, Session
 
-VISER = "1.1.1"
+__all__ = [
+    "DOOR", "LINES", "LOG", "VISER", "Door", "Held", "Hooks", "ServeError", "log_line",
+]  # fmt: skip
 
 LOG = logging.getLogger(__package__)
-
-
-class ServeError(RuntimeError):
-    """The page cannot be served: one line, what is wrong and what helps."""
 
 
 def _no_words(_control: Any, _asked: object, _put: object) -> str:

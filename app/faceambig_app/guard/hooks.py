@@ -16,8 +16,9 @@ import websockets.asyncio.server
 from viser import _client_autobuild, _gui_api, _gui_handles, _scene_api, _viser
 from viser.infra import _infra
 
-from .door import DOOR, VISER, Door, ServeError, log_line
+from .door import DOOR, Door, log_line
 from .messages import MAX_MESSAGE, consume, dispatch
+from .pinned import ServeError, check_viser
 from .requests import answer, dress
 from .sessions import SESSION, Session, produce
 from .uploads import part, start
@@ -49,10 +50,7 @@ def opened(door: Door, address: str, title: str) -> viser.ViserServer:
 def install() -> None:
     """Put the hooks in place, once; refuse another viser."""
     global _installed
-    if viser.__version__ != VISER:
-        raise ServeError(
-            f"viser {viser.__version__}: the page needs {VISER}: pip install viser=={VISER}"
-        )
+    check_viser()
     if _installed:
         return
     doors = types.SimpleNamespace(
@@ -80,8 +78,6 @@ def install() -> None:
     modules = (_gui_api, _gui_handles, _scene_api, _viser)
     hooks += [(m, name, ours) for m in modules for name, ours in reports if hasattr(m, name)]
     for owner, name, ours in hooks:
-        if not hasattr(owner, name):
-            raise ServeError(f"viser {VISER}: {name} is not where it was: install it again")
         setattr(owner, name, ours)
     _hush()
     _installed = True
