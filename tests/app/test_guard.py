@@ -11,6 +11,7 @@ import socket
 import sys
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import cast
 
 import msgspec
@@ -95,25 +96,72 @@ def test_the_page(tiny: Tiny) -> None:
     assert b"<title>faceambig</title>" in plain
 
 
+def asked(tiny: Tiny, *lines: str, target: str = "/") -> int:
+    """The status of a request with these lines alone."""
+    with socket.create_connection((tiny.host, tiny.port), timeout=SOON) as connection:
+        connection.sendall(
+            ("\r\n".join([f"GET {target} HTTP/1.1", *lines]) + "\r\n\r\n").encode("latin-1")
+        )
+        return int(connection.recv(4096).split()[1])
+
+
 HOSTILE_PATHS = (
-    "//", "//index.html", "/%69ndex.html", "/./index.html", "/..", "/../../etc/passwd", "/%2e%2e/x",
-    "/C:/Windows/win.ini", "/%5c%5chost%5cshare", "/x%00.js", "/index.html::$DATA", "/NUL", "/" + "a" * 5000,
+    "/../../../../etc/passwd", "/..%2f..%2f..%2f..%2fetc/passwd", "/%2e%2e/%2e%2e/%2e%2e/etc/passwd", "/..",
+    "/..%252f..%252fetc/passwd", "/%252e%252e/etc/passwd", "/....//....//etc/passwd", "/..;/etc/passwd", "/%2e%2e/x",
+    "/..\\..\\..\\etc\\passwd", "/..%5c..%5cetc%5cpasswd", "/%c0%ae%c0%ae/etc/passwd", "//etc/passwd",
+    "/%2fetc%2fpasswd", "///etc/passwd", "/etc/passwd%00.html", "/index.html%00", "/./../viser/__init__.py",
+    "/../__init__.py", "/../index.html", "/~root/.bashrc", "/proc/self/environ", "/C:/Windows/win.ini",
+    "/c:%5cWindows%5cwin.ini", "/C:Windows/win.ini", "/C%3a/Windows/win.ini", "/x%00.js",
+    "/%5c%5clocalhost%5cC$%5cWindows%5cwin.ini", "//localhost/C$/Windows/win.ini", "/%3f%3f/C:/Windows/win.ini",
+    "/file:///etc/passwd", "/index.html::$DATA", "/index.html.", "/CON", "/NUL", "/AUX.txt", "/.git/config", "/.env",
+    "/" + "a" * 5000, "/%", "/%zz", "http://127.0.0.1:22/", "http://evil.example/", "//evil.example/", "/\xff",
+    # the page by other spellings, which a server of files would know
+    "//", "/./index.html", "//index.html", "/%69ndex.html", "/.//index.html", "/index.html/", "/\\index.html",
+    "/x/%2e/index.html", "/index.html?a=\xff",
 )  # fmt: skip
 
 
 @pytest.mark.parametrize("path", HOSTILE_PATHS, ids=lambda path: path[:24])
-def test_there_is_no_other_file(tiny: Tiny, path: str) -> None:
-    assert tiny.get(path)[0].status == 404
+def test_there_is_no_other_file(tiny: Tiny, path: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def touched(*_: object, **__: object) -> None:
+        raise AssertionError("a request has reached the file system")  # answered by 500
+
+    # On Windows drives and devices are paths too: here nothing is asked of the file system at all
+    for name in ("open", "stat", "is_file", "exists", "read_bytes"):
+        monkeypatch.setattr(Path, name, touched)
+    assert asked(tiny, f"Host: {tiny.netloc}", target=path) == 404
 
 
 @pytest.mark.parametrize(
-    "host", ["", "evil.example", "127.0.0.1", "127.0.0.1:1", "localhost.evil.example:{}", "evil:{}"]
-)
+    "host",
+    [
+        "", "evil.example", "evil.example:{}", "127.0.0.1.evil.example:{}", "localhost.evil.example:{}",
+        "evil.example#127.0.0.1:{}", "127.0.0.1@evil.example:{}", "0.0.0.0:{}", "[::]:{}", "127.0.0.1", "127.0.0.1:1",
+        "2130706433:{}", "127.1:{}", "127.0.0.2:{}", "127.0.0.1:{}, evil.example", "127.0.0.1:{}.",
+    ],
+)  # fmt: skip
 def test_a_foreign_host_is_refused(tiny: Tiny, host: str) -> None:
     host = host.format(tiny.port)
     assert tiny.get(Host=host)[0].status == 421
     with pytest.raises(InvalidStatus, match="421"):
         Browser(tiny.port, additional_headers={"Host": host}, origin=None)
+
+
+WEBSOCKET = (
+    "Connection: Upgrade", "Upgrade: websocket", "Sec-WebSocket-Version: 13",
+    "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==", "Sec-WebSocket-Protocol: viser-v1.1.1",
+)  # fmt: skip
+
+
+def test_said_twice_is_refused(tiny: Tiny) -> None:
+    host, origin = f"Host: {tiny.netloc}", f"Origin: http://{tiny.netloc}"
+    assert asked(tiny, host) == 200
+    assert asked(tiny, host, "Host: evil.example") == 421
+    assert asked(tiny, host, host) == 421
+    assert asked(tiny, host, origin, *WEBSOCKET) == 101
+    assert asked(tiny, host, origin, "Origin: http://evil.example", *WEBSOCKET) == 403
+    assert asked(tiny, host, origin, "Upgrade: h2c", *WEBSOCKET) == 400
+    assert until(lambda: not tiny.sessions)
 
 
 def test_own_hosts_are_served(tiny: Tiny) -> None:
@@ -124,17 +172,15 @@ def test_own_hosts_are_served(tiny: Tiny) -> None:
 @pytest.mark.parametrize(
     "origin",
     [
-        "null",
-        "http://evil.example",
-        "https://{}",
-        "http://{}.evil.example",
-        "http://127.0.0.1:1",
-        "file://",
+        "http://evil.example", "http://evil.example:{port}", "http://127.0.0.1.evil.example:{port}",
+        "http://localhost.evil.example:{port}", "http://evil127.0.0.1:{port}", "http://{}.evil.example",
+        "http://{}@evil.example", "null", "file://", "http://127.0.0.1:1", "http://127.0.0.1", "ftp://{}",
+        "http://[::1]:{port}", "", "HTTP://EVIL.EXAMPLE", "http://{}/x", "https://{}", "http://localhost:{port}",
     ],
-)
+)  # fmt: skip
 def test_a_foreign_origin_is_refused(tiny: Tiny, origin: str) -> None:
     with pytest.raises(InvalidStatus, match="403"):
-        Browser(tiny.port, origin=origin.format(tiny.netloc))
+        Browser(tiny.port, origin=origin.format(tiny.netloc, port=tiny.port))
 
 
 @pytest.mark.parametrize(
@@ -143,7 +189,10 @@ def test_a_foreign_origin_is_refused(tiny: Tiny, origin: str) -> None:
         ("websocket=ws://evil.example:1/", ""),
         ("playbackPath=//evil.example/a.viser&distance=1.2", "?distance=1.2"),
         ("web%73ocket=x&view=top&view=%66", "?view=top&view=%66"),
-        ("WEBSOCKET=x", ""),
+        ("WEBSOCKET=x&websocket=ws://evil.example", ""),
+        ("x=1&websocket=ws%3A%2F%2Fevil.example", ""),
+        ("playbackPath=https://evil.example/a.viser", ""),
+        ("token=x", ""),
         ("distance&&view=1", "?distance&view=1"),
         ("next=//evil.example", ""),
     ],
@@ -215,13 +264,19 @@ def test_a_message_too_large_ends_its_own_connection(tiny: Tiny) -> None:
             browser.read(SOON)
 
 
-def test_there_is_no_tunnel(tiny: Tiny) -> None:
+def test_there_is_no_tunnel(tiny: Tiny, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(guard.ServeError, match="not published"):
         vars(_viser)["ViserTunnel"]("share.example", 80)
-    with tiny.browser() as (browser, _):
-        browser.send({"type": "ShareUrlRequest"})
-        browser.read(0.2)
-        assert tiny.server._share_tunnel is None
+    asked: list[object] = []
+    monkeypatch.setattr(_viser, "ViserTunnel", lambda *place: asked.append(place))
+    with tiny.browser() as (browser, controls):
+        for _ in range(3):
+            browser.send({"type": "ShareUrlRequest"})
+            browser.send({"type": "ShareUrlDisconnect"})
+        browser.set(controls["steps"], 7)
+        assert until(lambda: controls["steps"].value == 7)
+    assert not asked
+    assert tiny.server._share_tunnel is None
 
 
 # ---------------------------------------------------------------- uploads
@@ -380,6 +435,8 @@ def test_a_shared_control_is_checked_too(tiny: Tiny) -> None:
             assert until(lambda: shared.value == 10)
             assert until(lambda: witness.shows(shared) == 10)
             assert browser.shows(shared) == 10
+            with tiny.browser() as (late, _):
+                assert until(lambda: late.shows(shared) == 10)
     finally:
         shared.remove()
 

@@ -34,6 +34,7 @@ class Limits:
     )
     rate: float = 120.0  # messages a second that are read; more wait in the sender's own machine
     burst: float = 240.0  # messages that may come at once
+    hurry: float = 10.0  # seconds at full speed, which no hand keeps up: what it sends would be read long after it left
     waiting: int = 4000  # messages for a browser that does not take them
     waiting_bytes: int = 16 * 1024 * 1024
 
@@ -56,6 +57,7 @@ class Session:
         self.buffer: AsyncMessageBuffer | None = None
         self._opened = self._heard = self._loop.time()
         self._allowance = limits.burst
+        self._paced = self._opened  # when it last was slower than it may be
         self._closing: asyncio.Task[None] | None = None
         self._timer = self._loop.call_later(self._pause, self._look)
 
@@ -76,7 +78,11 @@ class Session:
         self._allowance = min(limits.burst, self._allowance + earned) - 1
         self._heard = now
         if self._allowance < 0:
+            if now - self._paced > limits.hurry:
+                await websocket.close(1008, "too fast")
             await asyncio.sleep(-self._allowance / limits.rate)
+        elif self._allowance > limits.burst / 2:
+            self._paced = now
         while self.at_work > AT_WORK:
             await asyncio.sleep(0.01)
         return raw
