@@ -50,7 +50,12 @@ class Browser:
     """Speaks viser's protocol as the page does, without drawing."""
 
     def __init__(
-        self, port: int, camera: bool = True, host: str = "127.0.0.1", **options: Any
+        self,
+        port: int,
+        camera: bool = True,
+        host: str = "127.0.0.1",
+        uri: str | None = None,
+        **options: Any,
     ) -> None:
         options = {
             "compression": None,
@@ -58,7 +63,7 @@ class Browser:
             "proxy": None,
         } | options
         self.socket: ClientConnection = connect(
-            f"ws://{host}:{port}/",
+            uri or f"ws://{host}:{port}/",
             subprotocols=[Subprotocol("viser-v1.1.1")],
             max_size=None,
             **options,

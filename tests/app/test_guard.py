@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import gc
 import gzip
 import logging
 import math
+import os
 import socket
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -511,12 +514,16 @@ def test_colours_are_checked(colours: np.ndarray) -> None:
 
 
 @pytest.mark.slow
-def test_nothing_is_left_of_two_hundred_browsers(tiny: Tiny) -> None:
-    def visit() -> None:
-        with Browser(tiny.port) as browser:
-            browser.read(0.005)
+def test_nothing_is_left_of_five_hundred_browsers(tiny: Tiny) -> None:
+    loop = tiny.server._websock_server._background_event_loop
+    assert loop is not None
 
-    def kept() -> tuple[int, int, int]:
+    def visit(k: int) -> None:
+        with Browser(tiny.port) as browser:
+            if k % 2:  # some go without a word
+                browser.socket.socket.shutdown(socket.SHUT_RDWR)
+
+    def kept() -> tuple[int, ...]:
         internal = tiny.server._websock_server
         assert until(lambda: not internal._live_connections and not tiny.server.get_clients())
         tiny.clients.clear()
@@ -524,17 +531,23 @@ def test_nothing_is_left_of_two_hundred_browsers(tiny: Tiny) -> None:
         return (
             sum(isinstance(o, viser.ClientHandle) for o in gc.get_objects()),
             len(internal._client_state_from_id),
+            len(asyncio.all_tasks(loop)),
+            len(os.listdir("/proc/self/fd")) if sys.platform == "linux" else 0,
+            threading.active_count(),
             len(gc.get_objects()),
         )
 
-    for _ in range(20):
-        visit()
+    for k in range(100):
+        visit(k)
     first = kept()
-    for _ in range(180):
-        visit()
+    for k in range(400):
+        visit(k)
     last = kept()
     assert last[:2] == first[:2] == (0, 0)
-    assert last[2] - first[2] < 180  # less than one object a browser
+    assert last[2] <= first[2]  # tasks of the loop
+    assert last[3] - first[3] < 10  # descriptors
+    assert last[4] - first[4] < 10  # threads: viser's pool may still grow to its 32
+    assert last[5] - first[5] < 400  # less than one object a browser
 
 
 logging.getLogger("websockets.client").setLevel(logging.ERROR)

@@ -6,6 +6,7 @@ import concurrent.futures
 import contextlib
 import gc
 import math
+import os
 import random
 import socket
 import struct
@@ -323,7 +324,9 @@ def test_files_for_who_does_not_read_wait_in_parts(tiny: Tiny) -> None:
             left = lambda: buffer.done  # noqa: E731
             senders = [
                 threading.Thread(
-                    target=lambda: ends.append(guard.send_file(client, "a.bin", bytes(2**23), left))
+                    target=lambda: ends.append(
+                        guard.send_file(client, "a.bin", os.urandom(2**23), left)
+                    )
                 )
                 for _ in range(3)
             ]

@@ -54,15 +54,15 @@ def start(
     `patches` replace our script and our mends of viser's bundle; tests show with them what happens without.
     """
     install()
-    page = make_page(
-        our_script() if script is None else script,
-        title,
-        PATCHES if patches is None else patches,
-    )
     listener = listen(host, port)
-    address, port = listener.getsockname()[:2]
     try:
+        address, port = listener.getsockname()[:2]
         access = make_access(address, port, token, allowed)
+        page = make_page(
+            our_script() if script is None else script,
+            title,
+            PATCHES if patches is None else patches,
+        )
     except ServeError:
         listener.close()
         raise
