@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import http.client
 import itertools
+import socket
 import struct
 import time
 from collections.abc import Callable, Iterator
@@ -252,3 +253,31 @@ def on_the_way(client: Any) -> int:
     """Bytes held of files that are being sent."""
     states = client.gui._current_file_upload_states.values()
     return sum(len(part) for state in states for part in state["parts"].values())
+
+
+def raw(tiny: Tiny, camera: bool = True) -> socket.socket:
+    """A websocket by hand, which reads nothing unless told to."""
+    connection = socket.socket()
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    connection.connect((tiny.host, tiny.port))
+    lines = (
+        "GET / HTTP/1.1", f"Host: {tiny.netloc}", "Connection: Upgrade", "Upgrade: websocket",
+        "Sec-WebSocket-Version: 13", "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==",
+        "Sec-WebSocket-Protocol: viser-v1.1.1",
+    )  # fmt: skip
+    connection.sendall(("\r\n".join(lines) + "\r\n\r\n").encode())
+    connection.settimeout(SOON)
+    answer = b""
+    while not answer.endswith(b"\r\n\r\n"):
+        answer += connection.recv(1)
+    assert answer.startswith(b"HTTP/1.1 101")
+    if camera:
+        connection.sendall(framed(msgspec.msgpack.encode(CAMERA)))
+    return connection
+
+
+def framed(data: bytes, first: int = 0x82) -> bytes:
+    """A frame as a client sends it, its mask all zeros."""
+    size = len(data)
+    length = bytes([0x80 | size]) if size < 126 else struct.pack(">BH", 0x80 | 126, size)
+    return bytes([first]) + length + bytes(4) + data

@@ -9,7 +9,6 @@ import math
 import os
 import random
 import socket
-import struct
 import threading
 import time
 from collections.abc import Iterator
@@ -21,7 +20,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from faceambig_app import guard
 from faceambig_app.guard import sessions
-from guarded import CAMERA, SOON, Browser, Tiny, begin, piece, tiny_page, until
+from guarded import CAMERA, SOON, Browser, Tiny, begin, framed, piece, raw, tiny_page, until
 
 LIMITS = guard.Limits(
     sessions=6,
@@ -48,34 +47,6 @@ def a_good_browser_is_served_afterwards(tiny: Tiny) -> Iterator[None]:
     yield
     assert until(lambda: tiny.sessions < LIMITS.sessions)
     tiny.works()
-
-
-def raw(tiny: Tiny, camera: bool = True) -> socket.socket:
-    """A websocket by hand, which reads nothing unless told to."""
-    connection = socket.socket()
-    connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-    connection.connect((tiny.host, tiny.port))
-    lines = (
-        "GET / HTTP/1.1", f"Host: {tiny.netloc}", "Connection: Upgrade", "Upgrade: websocket",
-        "Sec-WebSocket-Version: 13", "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==",
-        "Sec-WebSocket-Protocol: viser-v1.1.1",
-    )  # fmt: skip
-    connection.sendall(("\r\n".join(lines) + "\r\n\r\n").encode())
-    connection.settimeout(SOON)
-    answer = b""
-    while not answer.endswith(b"\r\n\r\n"):
-        answer += connection.recv(1)
-    assert answer.startswith(b"HTTP/1.1 101")
-    if camera:
-        connection.sendall(framed(msgspec.msgpack.encode(CAMERA)))
-    return connection
-
-
-def framed(data: bytes, first: int = 0x82) -> bytes:
-    """A frame as a client sends it, its mask all zeros."""
-    size = len(data)
-    length = bytes([0x80 | size]) if size < 126 else struct.pack(">BH", 0x80 | 126, size)
-    return bytes([first]) + length + bytes(4) + data
 
 
 def close_code(connection: socket.socket) -> int:
