@@ -69,6 +69,7 @@ class Browser:
             max_size=None,
             **options,
         )
+        self.messages: list[dict[str, Any]] = []  # all that were sent to it
         self.values: dict[str, Any] = {}  # of controls, as this browser would show them
         self.mark = next(MARKS)  # by which it is found among the clients
         if camera:
@@ -95,6 +96,7 @@ class Browser:
             size, packed = struct.unpack_from("<QQ", frame)
             content = zstandard.ZstdDecompressor().decompress(frame[16 : 16 + packed], size)
             for message in msgspec.msgpack.decode(content)["messages"]:
+                self.messages.append(message)
                 if message["type"] == "GuiUpdateMessage" and "value" in message["updates"]:
                     self.values[message["uuid"]] = message["updates"]["value"]
 

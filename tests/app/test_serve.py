@@ -110,6 +110,7 @@ def test_elsewhere_a_link_with_a_token_is_made_and_nobody_comes_in_without_it():
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
         try:
+            assert process.stdout is not None
             said = process.stdout.readline()
             found = re.search(r"http://127\.0\.0\.2:(\d+)/\?token=([A-Za-z0-9_-]{22})(?= )", said)
             assert found, said

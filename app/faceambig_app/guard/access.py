@@ -73,11 +73,12 @@ def make_access(
 
     `allowed` are further names: NAME or NAME:PORT of a proxy with TLS, or NAME with our own port for this machine.
     """
-    own = netlocs(["localhost", plain_address(address)], port)
+    anywhere = ipaddress.ip_address(address).is_unspecified
+    # Not 0.0.0.0: no link of ours has it, and pages of other sites use it to reach this machine
+    own = netlocs(["localhost", *([] if anywhere else [plain_address(address)])], port)
     names = {host: f"http://{host}" for host in own} | host_names(allowed, port)
     if token is None and needs_token(address, allowed):
         raise ServeError(f"host {address}: others can reach it, so it needs a token")
-    anywhere = ipaddress.ip_address(address).is_unspecified
     return Access(port, names, anywhere, None if token is None else _checked_token(token))
 
 
