@@ -7,10 +7,13 @@ from __future__ import annotations
 
 import asyncio
 import gc
+import math
 import re
 import signal
+import sys
 import threading
 import warnings
+from collections.abc import Collection
 from types import FrameType
 from typing import Any
 
@@ -35,15 +38,31 @@ CLOSED = re.compile("Queued a .* on a closed connection")  # a warning of viser
 class Page:
     """The server and its rooms."""
 
-    def __init__(self, host: str, port: int) -> None:
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        *,
+        token: str | None = None,
+        allowed: Collection[str] = (),
+        limits: guard.Limits | None = None,
+    ) -> None:
         model(DEFAULT.model)  # before the first browser comes
         frame(DEFAULT)
         self._dispatcher, self._orders = Dispatcher(), Orders()
         self._browsers: dict[int, Browser] = {}
         hooks = guard.Hooks(words=refusal, on_refused=self._refused, on_error=self._failed)
         self._server = guard.start(
-            host, port, keys=("v", *FIELDS), title=say("app.title"), hooks=hooks
+            host,
+            port,
+            token=token,
+            allowed=allowed,
+            limits=limits,
+            keys=("v", *FIELDS),
+            title=say("app.title"),
+            hooks=hooks,
         )
+        self._token, self._allowed = token, allowed
         # For everybody and before the first browser: a client that learns "up" later keeps its camera's old one
         self._server.scene.set_up_direction("+y")
         self._server.initial_camera.up = (0.0, 1.0, 0.0)
@@ -78,8 +97,15 @@ class Page:
 
     @property
     def address(self) -> str:
-        """Where the page is."""
-        return f"http://{self._server.get_host()}:{self._server.get_port()}/"
+        """Where the page is, by its address."""
+        return guard.links(self._server.get_host(), self._server.get_port())[0]
+
+    @property
+    def links(self) -> list[str]:
+        """What to give to whoever may come in: by each name of the page, with the token."""
+        brings = "" if self._token is None else f"?token={self._token}"
+        places = guard.links(self._server.get_host(), self._server.get_port(), self._allowed)
+        return [place + brings for place in places]
 
     def close(self) -> None:
         """Stop serving; returns within two seconds."""
@@ -99,6 +125,8 @@ def refusal(control: Any, asked: object, put: object) -> str:
     low, high = getattr(control, "min", None), getattr(control, "max", None)
     if (
         isinstance(asked, (int, float))
+        and not isinstance(asked, bool)
+        and math.isfinite(asked)
         and isinstance(put, (int, float))
         and low is not None
         and high is not None
@@ -114,7 +142,14 @@ def refusal(control: Any, asked: object, put: object) -> str:
     return say("error.number")
 
 
-def serve(host: str, port: int) -> int:
+def serve(
+    host: str,
+    port: int,
+    *,
+    token: str | None = None,
+    allowed: Collection[str] = (),
+    limits: guard.Limits | None = None,
+) -> int:
     """Serve the page until SIGINT or SIGTERM; the exit status."""
     stopped = threading.Event()
     status = 0
@@ -128,8 +163,18 @@ def serve(host: str, port: int) -> int:
     warnings.filterwarnings("ignore", CLOSED.pattern, UserWarning)
     for number in (signal.SIGINT, signal.SIGTERM):  # before anybody can know that the page is there
         signal.signal(number, stop)
-    page = Page(host, port)
-    print(f"faceambig is at {page.address} (Ctrl-C ends it)", flush=True)
+    if token is None and guard.needs_token(host, allowed):
+        token = guard.make_token()
+    page = Page(host, port, token=token, allowed=allowed, limits=limits)
+    first, *others = page.links
+    print(f"faceambig is at {first} (Ctrl-C ends it)")
+    for link in others:
+        print(f"and at {link}")
+    if token is not None:
+        print("Whoever has the link is let in, and is then known by a cookie.")
+        if sys.stdout.isatty():
+            print(guard.qr_code(first))
+    sys.stdout.flush()
     stopped.wait()
     page.close()
     return status

@@ -419,7 +419,7 @@ def test_serve_is_given_host_and_port(capsys, monkeypatch):
     import faceambig_app.server
 
     asked: list[tuple[str, int]] = []
-    monkeypatch.setattr(faceambig_app.server, "serve", lambda *place: asked.append(place) or 0)
+    monkeypatch.setattr(faceambig_app.server, "serve", lambda *place, **_: asked.append(place) or 0)
     assert printed(capsys, "serve", "--port", 0)[0] == 0
     assert printed(capsys, "serve", "--host", "::1")[0] == 0
     assert asked == [("127.0.0.1", 0), ("::1", 8080)]
@@ -535,7 +535,7 @@ BAD: dict[str, tuple[list[str], str]] = {
     "width words": (["snapshot", "--out", "{tmp}/a.png", "--width", "wide"], "'wide'"),
     "port words": (["serve", "--port", "http"], "'http'"),
     "port": (["serve", "--port", "99999"], "port 99999: must be from 0 to 65535"),
-    "host": (["serve", "--host", "192.0.2.1"], "host 192.0.2.1: the page is served to this machine only"),
+    "host": (["serve", "--host", "192.0.2.1"], "port 8080 at 192.0.2.1: "),
     "host name": (["serve", "--host", "nowhere.example"], "host 'nowhere.example'"),
 }  # fmt: skip
 

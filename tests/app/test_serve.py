@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import http.client
 import re
 import signal
 import socket
@@ -13,6 +14,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+from faceambig_app.cli import main
 
 SERVE = [
     sys.executable,
@@ -80,12 +83,82 @@ def test_a_taken_port_is_one_line():
     [
         (["--port", "70000"], "port 70000"),
         (["--host", "nowhere.invalid"], "host 'nowhere.invalid'"),
-        (["--host", "0.0.0.0"], "this machine only"),
+        (["--host", "192.0.2.99"], "port 8080 at 192.0.2.99"),
+        (["--token", "short"], "token: must be 16 to 128"),
+        (["--allow-host", "https://class.example"], "must be a name such as class.example"),
+        (["--max-sessions", "0"], "sessions 0: must be from 1 to 1000"),
+        (["--idle-minutes", "nan"], "idle minutes nan: must be above 0"),
         (["--port", "x"], "invalid int value"),
     ],
 )
-def test_a_place_that_cannot_be_served_is_one_line(flags, words):
-    done = subprocess.run([*SERVE, *flags], capture_output=True, text=True, timeout=60, check=False)
+def test_a_place_that_cannot_be_served_is_one_line(flags, words, capsys, monkeypatch):
+    monkeypatch.setattr(signal, "signal", lambda *_: None)  # those of the tests stay
+    try:
+        status = main(["serve", *flags])
+    except SystemExit as end:  # of the parser
+        status = end.code
+    out, err = capsys.readouterr()
+    assert (status, out) == (2, "")
+    assert len(err.splitlines()) == 1
+    assert words in err
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have one loopback address")
+def test_elsewhere_a_link_with_a_token_is_made_and_nobody_comes_in_without_it():
+    command = [*SERVE, "--host", "127.0.0.2", "--port", "0", "--max-sessions", "5"]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        try:
+            assert process.stdout is not None
+            said = process.stdout.readline()
+            found = re.search(r"http://127\.0\.0\.2:(\d+)/\?token=([A-Za-z0-9_-]{22})(?= )", said)
+            assert found, said
+            port, token = int(found[1]), found[2]
+
+            def ask(target, **headers):
+                connection = http.client.HTTPConnection("127.0.0.2", port, timeout=5)
+                connection.request("GET", target, headers=headers)
+                answer = connection.getresponse()
+                answer.read()
+                connection.close()
+                return answer
+
+            assert ask("/").status == 401
+            assert ask("/?token=" + "A" * 22).status == 401
+            assert ask("/", Host=f"127.0.0.1:{port}").status == 421
+            answer = ask(f"/?token={token}")
+            assert (answer.status, answer.headers["Location"]) == (303, "/")
+            cookie = answer.headers["Set-Cookie"].partition(";")[0]
+            assert ask("/", Cookie=cookie).status == 200
+        finally:
+            process.send_signal(signal.SIGTERM)
+            rest, err = process.communicate(timeout=10)
+    assert process.returncode == 0
+    assert token not in rest + err  # said once, in the link
+    assert "\x1b" not in rest  # the code is for a terminal
+
+
+def test_another_viser_is_refused_in_a_line(monkeypatch, capsys):
+    monkeypatch.setattr(signal, "signal", lambda *_: None)
+    monkeypatch.setattr("viser.__version__", "1.2.0")
+    assert main(["serve", "--port", "0"]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err == "faceambig serve: viser 1.2.0: the page needs 1.1.1: pip install viser==1.1.1\n"
+
+
+def test_a_viser_whose_parts_have_moved_is_refused_at_import():
+    """In a process of its own: the parts are looked for when the guard is imported."""
+    part = "WebsockMessageHandler._handle_incoming_message"
+    words = (
+        f"import viser.infra._infra as i; del i.{part}\n"
+        "import sys; from faceambig_app.cli import main; sys.exit(main(['serve', '--port', '0']))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", words], capture_output=True, text=True, timeout=60, check=False
+    )
     assert done.returncode == 2
-    assert len(done.stderr.splitlines()) == 1
-    assert words in done.stderr
+    assert re.fullmatch(
+        rf"faceambig serve: viser 1\.1\.1: {part} is not where it was: .*\n", done.stderr
+    )

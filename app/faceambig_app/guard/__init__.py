@@ -12,20 +12,24 @@ from collections.abc import Collection, Sequence
 
 import viser
 
+from .access import make_access, make_token, needs_token
 from .data import add_colours, data_html
 from .door import Door, Hooks, ServeError, log_line
 from .downloads import send_file
 from .hooks import install, opened
+from .invitation import links, qr_code
 from .messages import MAX_BAD, MAX_MESSAGE
 from .page import PATCHES, make_page, our_script
 from .reports import MAX_REPORT, add_reports
 from .requests import listen
+from .sessions import Limits
 from .uploads import MAX_UPLOAD, add_upload
 from .values import TYPING, restate
 
 __all__ = [
-    "MAX_BAD", "MAX_MESSAGE", "MAX_REPORT", "MAX_UPLOAD", "PATCHES", "TYPING", "Hooks", "ServeError", "add_colours",
-    "add_reports", "add_upload", "data_html", "log_line", "restate", "send_file", "start",
+    "MAX_BAD", "MAX_MESSAGE", "MAX_REPORT", "MAX_UPLOAD", "PATCHES", "TYPING", "Hooks", "Limits", "ServeError",
+    "add_colours", "add_reports", "add_upload", "data_html", "links", "log_line", "make_token", "needs_token",
+    "qr_code", "restate", "send_file", "start",
 ]  # fmt: skip
 
 
@@ -33,6 +37,9 @@ def start(
     host: str = "127.0.0.1",
     port: int = 8080,
     *,
+    token: str | None = None,
+    allowed: Collection[str] = (),
+    limits: Limits | None = None,
     keys: Collection[str] = (),
     title: str = "faceambig",
     hooks: Hooks | None = None,
@@ -41,22 +48,28 @@ def start(
 ) -> viser.ViserServer:
     """A viser server on an address of this machine; port 0 takes a free one (`get_port`). Prints nothing.
 
+    Where others can reach it (`needs_token`) it needs a `token`, which a link brings as `?token=`. `allowed` are names
+    it goes by besides its address: NAME or NAME:PORT of a proxy with TLS, or NAME with its own port.
     `keys` are the names that may stand in the page's address beside those of viser that do no harm. `script` and
     `patches` replace our script and our mends of viser's bundle; tests show with them what happens without.
     """
     install()
-    page = make_page(
-        our_script() if script is None else script,
-        title,
-        PATCHES if patches is None else patches,
-    )
     listener = listen(host, port)
-    address, port = listener.getsockname()[:2]
-    names = {"localhost", f"[{address}]" if ":" in address else address}
+    try:
+        address, port = listener.getsockname()[:2]
+        access = make_access(address, port, token, allowed)
+        page = make_page(
+            our_script() if script is None else script,
+            title,
+            PATCHES if patches is None else patches,
+        )
+    except ServeError:
+        listener.close()
+        raise
     door = Door(
         listener,
-        port,
-        frozenset(f"{name}:{port}" for name in names) | (names if port == 80 else frozenset()),
+        access,
+        limits or Limits(),
         frozenset(keys) | {"darkMode", "fixedDpr"},
         page,
         hooks or Hooks(),

@@ -5,21 +5,27 @@ from __future__ import annotations
 import asyncio
 import logging
 import socket
+import threading
+import time
+from collections import deque
 from collections.abc import Callable
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:
-    from .page import Page
+# First of all: what the others take from viser is there
+from .pinned import VISER, ServeError
 
-VISER = "1.1.1"
+if TYPE_CHECKING:
+    from .access import Access
+    from .page import Page
+    from .sessions import Limits, Session
+
+__all__ = [
+    "DOOR", "LINES", "LOG", "VISER", "Door", "Held", "Hooks", "ServeError", "log_line",
+]  # fmt: skip
 
 LOG = logging.getLogger(__package__)
-
-
-class ServeError(RuntimeError):
-    """The page cannot be served: one line, what is wrong and what helps."""
 
 
 def _no_words(_control: Any, _asked: object, _put: object) -> str:
@@ -49,12 +55,13 @@ class Door:
     """One server of ours: its socket, its page and the controls that wait for the end of typing."""
 
     listener: socket.socket
-    port: int
-    names: frozenset[str]  # values of Host that mean us
+    access: Access
+    limits: Limits
     keys: frozenset[str]
     page: Page
     hooks: Hooks
     held: dict[tuple[int, str], Held] = field(default_factory=dict)
+    sessions: set[Session] = field(default_factory=set)
 
     def failed(self, client_id: int | None, error: BaseException) -> None:
         log_line(f"{type(error).__name__}: {error}")
@@ -74,6 +81,41 @@ class Door:
 DOOR: ContextVar[Door | None] = ContextVar("door of the running connection", default=None)
 
 
+class Lines:
+    """When the last lines of the log were written: so many in so long, for whoever sends what costs a line."""
+
+    MOST, SECONDS = 20, 10.0
+
+    def __init__(self) -> None:
+        self._written: deque[float] = deque(maxlen=self.MOST)
+        self._left_out = 0
+        self._one = threading.Lock()
+
+    def room(self) -> int | None:
+        """How many lines were left out before this one; None if this one is too."""
+        with self._one:
+            now = time.monotonic()
+            if len(self._written) == self.MOST and now - self._written[0] < self.SECONDS:
+                self._left_out += 1
+                return None
+            self._written.append(now)
+            left_out, self._left_out = self._left_out, 0
+            return left_out
+
+    def clear(self) -> None:
+        with self._one:
+            self._written.clear()
+            self._left_out = 0
+
+
+LINES = Lines()
+
+
 def log_line(text: str) -> None:
     """One line of the log, whatever is in the text."""
+    left_out = LINES.room()
+    if left_out is None:
+        return
+    if left_out:
+        LOG.warning("page: %d lines are left out", left_out)
     LOG.warning("page: %s", text[:200].encode("unicode_escape").decode())

@@ -26,9 +26,11 @@ from viser import (
 from viser.infra import _infra
 from viser.infra._async_message_buffer import AsyncMessageBuffer
 
-from .door import DOOR, VISER, Door, ServeError, log_line
+from .door import DOOR, Door, log_line
 from .messages import MAX_MESSAGE, consume, dispatch
+from .pinned import ServeError, check_viser
 from .requests import answer, dress
+from .sessions import SESSION, Session, produce
 from .uploads import part, start
 from .values import update
 
@@ -49,7 +51,7 @@ def opened(door: Door, address: str, title: str) -> viser.ViserServer:
     with _opening_one:
         _opening = door
         try:
-            server = viser.ViserServer(address, door.port, label=title, verbose=False)
+            server = viser.ViserServer(address, door.access.port, label=title, verbose=False)
         finally:
             _opening = None
     _name_failures(server, door)
@@ -59,10 +61,7 @@ def opened(door: Door, address: str, title: str) -> viser.ViserServer:
 def install() -> None:
     """Put the hooks in place, once; refuse another viser."""
     global _installed
-    if viser.__version__ != VISER:
-        raise ServeError(
-            f"viser {viser.__version__}: the page needs {VISER}: pip install viser=={VISER}"
-        )
+    check_viser()
     if _installed:
         return
     doors = types.SimpleNamespace(
@@ -78,6 +77,7 @@ def install() -> None:
         (_infra, "websockets", doors),
         (_infra, "_message_consumer", consume),
         (AsyncMessageBuffer, "__init__", _buffer),
+        (_infra, "_message_producer", produce),
         (_infra.WebsockMessageHandler, "_handle_incoming_message", dispatch),
         (_gui_api.GuiApi, "_handle_gui_updates", update),
         (_gui_api.GuiApi, "_handle_file_transfer_start", start),
@@ -91,8 +91,6 @@ def install() -> None:
     modules = (_gui_api, _gui_handles, _scene_api, _viser)
     hooks += [(m, name, ours) for m in modules for name, ours in reports if hasattr(m, name)]
     for owner, name, ours in hooks:
-        if not hasattr(owner, name):
-            raise ServeError(f"viser {VISER}: {name} is not where it was: install it again")
         setattr(owner, name, ours)
     _hush()
     _installed = True
@@ -148,17 +146,26 @@ def _serve(handler: Callable[[Any], Awaitable[None]], host: str, port: int, **op
         return _real_serve(handler, host, port, **options)
 
     async def ours(connection: Any) -> None:
+        if len(door.sessions) >= door.limits.sessions:  # several came in at once
+            await connection.close(1013, "too many browsers")
+            return
+        session = Session(door.limits, connection)
         DOOR.set(door)
+        SESSION.set(session)
+        door.sessions.add(session)
         try:
             await handler(connection)
         except Exception as error:  # noqa: BLE001 - a session ends, the page goes on
             door.failed(None, error)
+        finally:
+            door.sessions.discard(session)
+            session.end()
 
     return _real_serve(
         ours,
         sock=door.listener,
-        process_request=lambda _, request: answer(door, request),
-        process_response=lambda _, request, response: dress(door, request, response),
+        process_request=lambda at, request: answer(door, _address(at), request),
+        process_response=lambda at, request, response: dress(door, _address(at), request, response),
         select_subprotocol=_subprotocol,
         max_size=MAX_MESSAGE,
         max_queue=4,
@@ -171,6 +178,11 @@ def _serve(handler: Callable[[Any], Awaitable[None]], host: str, port: int, **op
         server_header=None,
         logger=QUIET,
     )
+
+
+def _address(connection: Any) -> str:
+    """The address of this machine at which somebody has come."""
+    return connection.local_address[0]
 
 
 def _subprotocol(_connection: Any, offered: Sequence[Any]) -> Any:

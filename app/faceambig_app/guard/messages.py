@@ -11,6 +11,7 @@ import msgspec
 from viser.infra import _infra
 
 from .door import DOOR, log_line
+from .sessions import SESSION, Session
 
 MAX_MESSAGE = 768 * 1024  # bytes; an upload arrives in parts of 512 KiB
 MAX_BAD = 40  # messages that mean nothing, before the connection is closed
@@ -23,14 +24,15 @@ real_dispatch = _infra.WebsockMessageHandler._handle_incoming_message
 
 async def consume(websocket: Any, handle_message: Any, message_class: Any) -> None:
     """viser's reader of one connection; ours lets through what `FIELDS` knows."""
-    if DOOR.get() is None:
+    session = SESSION.get()
+    if session is None:
         await real_consumer(websocket, handle_message, message_class)
         return
     bad = 0
     while True:
-        raw = await websocket.recv()
+        raw = await session.read(websocket)
         try:
-            message = _checked(raw, message_class)
+            message = _checked(session, raw, message_class)
         except (ValueError, TypeError, RecursionError, msgspec.MsgspecError) as error:
             bad += 1
             if bad == 1:
@@ -38,10 +40,11 @@ async def consume(websocket: Any, handle_message: Any, message_class: Any) -> No
             if bad >= MAX_BAD:
                 await websocket.close(1008, "too many bad messages")
             continue
+        session.at_work += 2  # the server's handlers and the client's
         handle_message(message)
 
 
-def _checked(raw: object, message_class: Any) -> Any:
+def _checked(session: Session, raw: object, message_class: Any) -> Any:
     if not isinstance(raw, bytes):
         raise TypeError("text instead of bytes")
     content = msgspec.msgpack.decode(raw)
@@ -54,8 +57,12 @@ def _checked(raw: object, message_class: Any) -> Any:
     for name, holds in fields.items():
         if not holds(content[name]):
             raise ValueError(f"{kind}: {name}")
+    if not session.shown and kind != "ViewerCameraMessage":
+        raise ValueError(f"{kind}: before the first camera")
     message = message_class.deserialize(raw)
-    if kind == "ViewerCameraMessage":  # a canvas without height has no aspect
+    if kind == "ViewerCameraMessage":
+        session.shown = True
+        # A canvas without height has no aspect
         message.image_height = max(1, message.image_height)
         message.image_width = max(1, message.image_width)
     return message
@@ -123,3 +130,7 @@ async def dispatch(self: Any, client_id: Any, message: Any) -> None:
         if door is None:
             raise
         door.failed(int(client_id), error)
+    finally:
+        session = SESSION.get()
+        if session is not None:
+            session.at_work -= 1

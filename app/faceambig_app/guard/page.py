@@ -69,12 +69,13 @@ class Page:
     zipped: bytes
     hashes: tuple[str, ...]  # of our script, viser's loader, viser's bundle
 
-    def policy(self, host: str) -> str:
+    def policy(self, origin: str) -> str:
+        """What the page may load and whom it may speak to: `origin`, where it comes from."""
         scripts = " ".join(f"'sha256-{value}'" for value in self.hashes)
         return (
             f"default-src 'none'; script-src 'wasm-unsafe-eval' {scripts}; worker-src blob: data:; "
             "style-src 'unsafe-inline'; img-src 'self' data: blob:; font-src 'self' data:; "
-            f"connect-src 'self' ws://{host} data: blob:; "
+            f"connect-src 'self' {origin.replace('http', 'ws', 1)} data: blob:; "
             "object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
         )
 

@@ -7,11 +7,13 @@ import http
 import ipaddress
 import socket
 import sys
+from collections.abc import Sequence
 
 from websockets import Headers
 from websockets.http11 import Request, Response
 
 from ..link import IGNORED, ignored, told_ignored
+from .access import Access
 from .door import Door, ServeError
 
 HEADERS = {
@@ -24,21 +26,27 @@ HEADERS = {
     "Permissions-Policy": "camera=(), microphone=(), geolocation=()",
 }
 
+LINKLESS = "This page needs its link, with the token: whoever serves it has it."
+AGAIN = "again"  # in an address: asked for once more
 
-def answer(door: Door, request: Request) -> Response | None:
-    """The answer to a request; None lets a websocket through."""
+
+def answer(door: Door, address: str, request: Request) -> Response | None:
+    """The answer to a request that has come in at `address`; None lets a websocket through."""
+    access = door.access
     hosts = [value.lower() for value in request.headers.get_all("Host")]
-    if len(hosts) != 1 or hosts[0] not in door.names:  # another name: DNS rebinding
+    origin = access.origin(hosts[0], address) if len(hosts) == 1 else None
+    if origin is None:  # another name: DNS rebinding
         return reply(421, "This server does not go by that name.")
     path, _, query = request.path.partition("?")
     if request.headers.get_all("Upgrade"):
-        origins = request.headers.get_all("Origin")
-        if origins and origins != [f"http://{hosts[0]}"]:  # a page of another site
-            return reply(403, "Another page may not connect.")
-        return None if path == "/" else reply(404, "There is one page, /.")
-    if path not in ("/", "/index.html"):
+        return _joined(door, request, origin, path)
+    if path not in ("/", "/index.html") or not query.isascii():
         return reply(404, "There is one page, /.")
     pieces = query.split("&") if query else []
+    if access.token is not None:
+        entering = _entered(access, request, pieces, origin)
+        if entering is not None:
+            return entering
     kept = _ours(door, pieces)
     if kept != pieces:
         return reply(303, "", Location="/?" + "&".join(kept) if kept else "/")
@@ -69,16 +77,51 @@ def _ours(door: Door, pieces: list[str]) -> list[str]:
     return [*kept, f"{IGNORED}={ignored(others)}"] if others else kept
 
 
-def dress(door: Door, request: Request, response: Response) -> None:
+def _joined(door: Door, request: Request, origin: str, path: str) -> Response | None:
+    """The answer to a websocket's request; None lets it in."""
+    if len(request.headers.get_all("Upgrade")) != 1:
+        return reply(400, "One protocol at a time.")
+    origins = request.headers.get_all("Origin")
+    if origins and origins != [origin]:  # a page of another site
+        return reply(403, "Another page may not connect.")
+    if not door.access.knows(request.headers.get_all("Cookie")):
+        return reply(403, LINKLESS)
+    if path != "/":
+        return reply(404, "There is one page, /.")
+    if len(door.sessions) >= door.limits.sessions:
+        return reply(503, "Too many browsers: try again when one has left.")
+    return None
+
+
+def _entered(
+    access: Access, request: Request, pieces: Sequence[str], origin: str
+) -> Response | None:
+    """The answer to who comes with a token, or without one; None to who has come in before."""
+    rest = [piece for piece in pieces if piece.partition("=")[0] not in ("token", AGAIN)]
+    place = "/?" + "&".join(rest) if rest else "/"
+    tokens = [piece.partition("=")[2] for piece in pieces if piece.partition("=")[0] == "token"]
+    if access.takes(tokens):
+        name, secret = access.cookie
+        flags = "Path=/; HttpOnly; SameSite=Strict" + "; Secure" * origin.startswith("https:")
+        return reply(303, "", Location=place, **{"Set-Cookie": f"{name}={secret}; {flags}"})
+    if access.knows(request.headers.get_all("Cookie")):
+        return None if len(rest) == len(pieces) else reply(303, "", Location=place)
+    # From a link on another site a browser sends no strict cookie, not even after a redirect: it asks once more itself.
+    if not tokens and AGAIN not in pieces:
+        once_more = f"0; url={place}{'&' if rest else '?'}{AGAIN}"
+        return reply(401, LINKLESS, Refresh=once_more)
+    return reply(401, LINKLESS)
+
+
+def dress(door: Door, address: str, request: Request, response: Response) -> None:
     """Headers on every answer, those of websockets itself included."""
     if response.status_code == 101:
         return
     host = next(iter(request.headers.get_all("Host")), "").lower()
     for name, value in HEADERS.items():
         response.headers[name] = value
-    response.headers["Content-Security-Policy"] = door.page.policy(
-        host if host in door.names else f"127.0.0.1:{door.port}"
-    )
+    origin = door.access.origin(host, address) or f"http://127.0.0.1:{door.access.port}"
+    response.headers["Content-Security-Policy"] = door.page.policy(origin)
 
 
 def listen(host: str, port: int) -> socket.socket:
@@ -88,10 +131,8 @@ def listen(host: str, port: int) -> socket.socket:
         address = ipaddress.ip_address(name)  # no look-up of names, which may take its time
     except ValueError:
         raise ServeError(
-            f"host {host!r}: not an address of this machine, 127.0.0.1 or ::1"
+            f"host {host!r}: not an address: 127.0.0.1 for this machine only, 0.0.0.0 for all that reach it"
         ) from None
-    if not address.is_loopback:  # nothing here asks who comes in
-        raise ServeError(f"host {host}: the page is served to this machine only, 127.0.0.1 or ::1")
     if not 0 <= port <= 65535:
         raise ServeError(f"port {port}: must be from 0 to 65535")
     listener = socket.socket(socket.AF_INET if address.version == 4 else socket.AF_INET6)

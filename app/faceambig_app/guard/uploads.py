@@ -82,14 +82,14 @@ def part(api: Any, client_id: Any, message: Any) -> None:
 
 
 def _end(api: Any, client_id: Any, message: Any) -> None:
-    """Tell the page that the transfer is over: its button waits for that."""
+    """Tell the page that the transfer is over, nothing of it taken: its button waits for that."""
     client = api._resolve_client(client_id)
     if client is None:
         return
     done = partial(
         _messages.FileTransferPartAck, message.source_component_uuid, message.transfer_uuid
     )
-    client._websock_connection.queue_message(done(message.size_bytes, message.size_bytes))
+    client._websock_connection.queue_message(done(0, 0))
 
 
 def plain_name(name: str) -> str:

@@ -1,0 +1,141 @@
+"""Sessions: how many browsers there may be, how fast each may speak, and when one is sent away.
+
+A message costs a look at the clock and two counters; all else is looked at once a second.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from contextvars import ContextVar
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any
+
+import numpy as np
+from viser.infra import _infra
+from viser.infra._async_message_buffer import AsyncMessageBuffer
+
+from .door import ServeError, log_line
+
+AT_WORK = 16  # handlers of one browser that may be at work before its next message is read
+IN_TRANSPORT = 32 * 1024 * 1024  # bytes written and not taken: more than the largest frame of ours
+LOOK = 1.0  # seconds between two looks at a browser
+
+real_producer = _infra._message_producer
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What one browser, and all together, may take."""
+
+    sessions: int = 64  # browsers at a time
+    first: float = 8.0  # seconds until a browser must have shown its camera
+    idle: float = (
+        3600.0  # seconds without a word; the page comes back by itself when it is looked at
+    )
+    rate: float = 120.0  # messages a second that are read; more wait in the sender's own machine
+    burst: float = 240.0  # messages that may come at once
+    hurry: float = 10.0  # seconds at full speed, which no hand keeps up: what it sends would be read long after it left
+    waiting: int = 4000  # messages for a browser that does not take them
+    waiting_bytes: int = 16 * 1024 * 1024
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.sessions <= 1000:
+            raise ServeError(f"sessions {self.sessions}: must be from 1 to 1000")
+        if not 0 < self.idle <= 7 * 86400:  # refuses NaN too
+            raise ServeError(f"idle minutes {self.idle / 60:g}: must be above 0 and at most 10080")
+
+
+class Session:
+    """One connection, from its handshake to its end."""
+
+    def __init__(self, limits: Limits, connection: Any) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._limits = limits
+        self._connection: Any = connection
+        self.shown = False  # whether its first camera has come
+        self.at_work = 0
+        self.buffer: AsyncMessageBuffer | None = None
+        self._opened = self._heard = self._loop.time()
+        self._allowance = limits.burst
+        self._paced = self._opened  # when it last was slower than it may be
+        self._closing: asyncio.Task[None] | None = None
+        self._timer = self._loop.call_later(self._pause, self._look)
+
+    @property
+    def _pause(self) -> float:
+        return min(LOOK, self._limits.first / 4, self._limits.idle / 4)
+
+    def end(self) -> None:
+        """It is over: nothing of the browser is held from here."""
+        self._timer.cancel()
+        self._connection = self.buffer = None
+
+    async def read(self, websocket: Any) -> Any:
+        """The next message, when it is this browser's turn: TCP then slows the sender."""
+        raw = await websocket.recv()
+        now, limits = self._loop.time(), self._limits
+        earned = (now - self._heard) * limits.rate
+        self._allowance = min(limits.burst, self._allowance + earned) - 1
+        self._heard = now
+        if self._allowance < 0:
+            if now - self._paced > limits.hurry:
+                await websocket.close(1008, "too fast")
+            await asyncio.sleep(-self._allowance / limits.rate)
+        elif self._allowance > limits.burst / 2:
+            self._paced = now
+        while self.at_work > AT_WORK:
+            await asyncio.sleep(0.01)
+        return raw
+
+    def _look(self) -> None:
+        if self._connection is None:
+            return
+        now = self._loop.time()
+        if not self.shown and now - self._opened > self._limits.first:
+            self._close("no camera")
+        elif now - self._heard > self._limits.idle:
+            self._close("idle")
+        elif self._stuck():
+            log_line("a browser that does not read is cut off")
+            self._connection.transport.abort()
+        else:
+            self._timer = self._loop.call_later(self._pause, self._look)
+
+    def _close(self, why: str) -> None:
+        self._closing = self._loop.create_task(self._connection.close(1008, why))
+
+    def _stuck(self) -> bool:
+        if self._connection.transport.get_write_buffer_size() > IN_TRANSPORT:
+            return True
+        if self.buffer is None or not self.buffer.message_from_id:
+            return False
+        with self.buffer.buffer_lock:
+            waiting = list(self.buffer.message_from_id.values())
+        return (
+            len(waiting) > self._limits.waiting
+            or sum(map(_weight, waiting)) > self._limits.waiting_bytes
+        )
+
+
+SESSION: ContextVar[Session | None] = ContextVar("session of the running connection", default=None)
+
+
+async def produce(websocket: Any, buffer: Any, client_id: Any, *rest: Any, **options: Any) -> None:
+    """viser's writer of one connection; ours notes where what is meant for this browser alone waits."""
+    session = SESSION.get()
+    if session is not None and not buffer.persistent_messages:
+        session.buffer = buffer
+    await real_producer(websocket, buffer, client_id, *rest, **options)
+
+
+def _weight(value: object) -> int:
+    """About the bytes that a message holds."""
+    if isinstance(value, np.ndarray):
+        return value.nbytes
+    if isinstance(value, bytes | str):
+        return len(value)
+    if isinstance(value, dict):
+        return sum(map(_weight, value.values()))
+    if is_dataclass(value) and not isinstance(value, type):
+        return sum(_weight(getattr(value, one.name)) for one in fields(value))
+    return 8
