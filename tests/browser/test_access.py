@@ -12,7 +12,8 @@ pytestmark = pytest.mark.browser
 TABS = ("Explore", "View", "Compare", "Data", "Export")
 FOLDED = ".mantine-Paper-root[role=button][aria-expanded=false]"
 # What has the focus: its element, its name, its size and whether it is seen to have it
-FOCUSED = """() => { const e = document.activeElement; if (e === document.body) return null;
+FOCUSED = """() => { const e = document.activeElement; if (e === document.body || walked.has(e)) return null;
+  walked.add(e);
   const box = e.getBoundingClientRect(), x = box.x + box.width / 2, y = box.y + box.height / 2;
   const above = document.elementFromPoint(x, y);
   return [e.ariaLabel || e.labels?.[0]?.textContent || e.textContent.trim(), box.width, box.height,
@@ -77,7 +78,7 @@ def walked(me: Visitor) -> list[str]:
     """Names of all that Tab goes through from the top of the page to its end, but tabs; each seen and large enough."""
     me.tab.evaluate(
         "() => { const first = document.createElement('span'); first.tabIndex = -1; document.body.prepend(first);"
-        " first.focus(); first.remove() }"
+        " first.focus(); first.remove(); window.walked = new Set() }"
     )
     names = []
     for _ in range(120):
