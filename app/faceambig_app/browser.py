@@ -79,7 +79,9 @@ class Browser:
             index: subject.name for index, subject in enumerate(model(DEFAULT.model).subjects, 1)
         }
         people["photo"] = say("own.mine")
-        self._own = OwnRoom(loop, self._own_changed, self.notice)
+        self._own = OwnRoom(
+            loop, self._own_changed, self.notice, steps=lambda: len(self._history.past)
+        )
         self._own.model = DEFAULT.model
         self._hint: float | None = (
             None  # metres: of the camera, as the own photograph's file tells it
@@ -133,6 +135,8 @@ class Browser:
             case "glide":
                 if not on:
                     self._glide.start(self.room.state.distance, stills=self._still)
+            case "undo" if self._own.newest >= len(self._history.past):
+                self._own.undo()  # points of the photograph came after the last step of the state
             case "undo":
                 self._travel(history.undo(self._history))
             case "redo":

@@ -27,12 +27,15 @@ class OwnRoom:
         loop: asyncio.AbstractEventLoop,
         changed: Callable[[], None],
         notice: Callable[[str], None],
+        steps: Callable[[], int] = lambda: 0,
     ) -> None:
         self.photo: OwnPhoto | None = None
         self.model = ""  # name of the model whose points are placed
         self.status = ""  # what has just been done, in words
-        self._loop, self._changed, self._notice = loop, changed, notice
-        self._past: list[OwnPhoto] = []  # the photograph with the points of before, oldest first
+        self._loop, self._changed, self._notice, self._steps = loop, changed, notice, steps
+        self._past: list[
+            tuple[int, OwnPhoto]
+        ] = []  # the points of before, oldest first, and `steps` then
         self._dragged: int | None = None  # the point that a hand holds
         self._job = 0  # counts what was asked for: what comes late is not wanted any more
         self._todo: tuple[int, Make, Callable[[OwnPhoto], None]] | None = None
@@ -44,6 +47,11 @@ class OwnRoom:
     def can_undo(self) -> bool:
         """Whether there were other points before these."""
         return bool(self._past)
+
+    @property
+    def newest(self) -> int:
+        """`steps` of the history of states when points changed last; -1 where none did."""
+        return self._past[-1][0] if self._past else -1
 
     def leave(self) -> None:
         """Keep nothing: the browser has gone."""
@@ -138,7 +146,7 @@ class OwnRoom:
     def undo(self) -> None:
         """The points of before."""
         if self._past and self.photo is not None:
-            before, part = self._past.pop(), self.photo.part
+            (_, before), part = self._past.pop(), self.photo.part
             self._show(own.replace_part(before, part))
 
     def hear(self, report: Point | Click | Gone) -> None:
@@ -164,7 +172,7 @@ class OwnRoom:
         """Another set of points; those of before can be had again."""
         if self.photo is not None and photo is not self.photo:
             before = own.with_points(self.photo, self.photo.points)  # without what was computed
-            self._past = [*self._past, before][-STEPS:]
+            self._past = [*self._past, (self._steps(), before)][-STEPS:]
         self._show(photo, words)
 
     def _show(self, photo: OwnPhoto, words: str = "") -> None:

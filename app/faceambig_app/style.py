@@ -6,9 +6,9 @@ SMALLEST, LARGEST = 1.0, 2.0  # of the text
 
 _TOKENS = """
 :root{--fa-ink:#1D2733;--fa-dim:#52606D;--fa-line:#D5DCE3;--fa-card:#F6F8FA;--fa-band:#E3EAF2;
---fa-dl:#1B5FC1;--fa-ds:#A84A00;--fa-seen:#C8102E}
+--fa-dl:#1B5FC1;--fa-ds:#A84A00;--fa-seen:#C8102E;--fa-on:#FFF}
 [data-mantine-color-scheme=dark]{--fa-ink:#E9EEF3;--fa-dim:#A9B4BF;--fa-line:#3C4650;--fa-card:#252A30;
---fa-band:#2B3540;--fa-dl:#7AB7FF;--fa-ds:#FFAB66;--fa-seen:#FF7A85}
+--fa-band:#2B3540;--fa-dl:#7AB7FF;--fa-ds:#FFAB66;--fa-seen:#FF7A85;--fa-on:#181C21}
 """
 
 _TEXT = """
@@ -34,8 +34,10 @@ font-variant-numeric:tabular-nums;line-height:1.15;display:block}
 .fa-card i{font-style:normal;font-size:calc(14px*var(--fa-scale,1))}
 .fa-dl{border-color:var(--fa-dl)}.fa-dl span{color:var(--fa-dl)}
 .fa-ds{border-color:var(--fa-ds)}.fa-ds span{color:var(--fa-ds)}
-.fa-both{display:grid;grid-template-columns:46% 1fr;align-items:start}
-.fa-both .fa{padding-right:0}.fa-both .fa+.fa{padding-right:.75em}.fa-both .fa-cards{grid-template-columns:1fr}
+.fa-both{display:flex;flex-wrap:wrap;align-items:start}.fa-both>*{flex:1 1 46%;min-width:0}
+.fa-both>:last-child{flex:999 1 calc(160px*var(--fa-scale,1))}
+.fa-both .fa{padding-right:0}
+.fa-both .fa+.fa{padding-right:.75em}.fa-both .fa-cards{grid-template-columns:1fr}
 .fa-bars{list-style:none;margin:.3em 0;padding:0}.fa-bars li{display:grid;grid-template-columns:1fr auto;gap:0 8px}
 .fa-bars i{grid-column:1/3;height:8px;border-radius:2px;background:var(--fa-ds);margin-bottom:4px;min-width:1px}
 .fa-legend{display:flex;gap:0 6px;align-items:start;font-variant-numeric:tabular-nums}
@@ -76,6 +78,14 @@ label[for]{color:var(--fa-dim)!important;letter-spacing:0!important;font-size:ca
 [data-mantine-color-scheme=dark] [style*="color: var(--mantine-primary-color-filled)"]{color:#7AB7FF!important}
 .mantine-Button-root[data-variant=outline]{--button-color:var(--fa-dl)!important;
 --button-bd:1px solid var(--fa-dl)!important}
+.mantine-Button-root:not([data-variant=outline],[data-disabled]){--button-bg:#1B5FC1!important;background:#1B5FC1}
+.mantine-Button-label{white-space:normal!important;height:auto!important;line-height:1.25;padding-block:2px}
+button[aria-pressed=true]{background:var(--fa-dl)!important;color:var(--fa-on)!important}
+[style*="text-overflow: ellipsis"][style*="letter-spacing"]{font-size:min(1rem,22px)}
+.mantine-Flex-root:has(>div>p>label[for]){flex-wrap:wrap;row-gap:4px}
+.mantine-Flex-root>div:has(>p>label[for]){flex:1 0 auto!important;max-width:100%}
+.mantine-Flex-root>div:has(>p>label[for])+div{flex:100 1 9em!important;min-width:0}
+.mantine-Flex-root>div:has(>p>label[for])+div:has([type=checkbox]){flex-basis:24px!important}
 @media(max-width:576px){.mantine-Paper-root[style*="20em"]{width:100%!important;left:0!important;right:0!important}
 .mantine-ScrollArea-content>div[style*="20em"]{width:100%!important}
 .fa{line-height:1.35}.fa h1{margin:.2em 0}.fa-card{padding:4px 8px}

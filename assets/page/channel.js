@@ -8,7 +8,7 @@
 //   pressed    {label of a button group: option that is on}
 //   valuetext  {label of a slider: what a screen reader says for its number}
 //   icons      {viser's icon: name of the buttons that show it}
-//   words      {lost, back, no_webgl, copy, close}: what this script itself says; the first ones come with the page
+//   words      {lost, back, no_webgl, copy, close, number}: what this script itself says; the first ones come with the page
 //   report     {uuid}: the text control that takes reports; it is answered by "hello"
 //   address    {query}: what the address bar shows after "/?"; never a new entry of the history
 //   copy       {text, n, link}: to the clipboard, once for each n, answered by "copied"; a link: text is its query
@@ -41,6 +41,7 @@
 
 const readers = Object.create(null); // kind of data -> what is done with its value; each part adds its own
 const onConnection = []; // each is told whether there is a connection
+const holds = []; // each is shown what viser sends, and says whether it keeps that for later
 const words = {};
 const newest = {}; // kind -> what came last: the server repeats what is, and that is no new wish
 let socket = null; // viser's worker that speaks with the server, while it is connected
@@ -84,6 +85,10 @@ window.Worker = class extends window.Worker {
   constructor(...given) {
     super(...given);
     this.addEventListener("message", hear);
+  }
+
+  postMessage(message, ...rest) {
+    if (!holds.some((hold) => hold(message))) super.postMessage(message, ...rest);
   }
 };
 

@@ -85,7 +85,6 @@ style.textContent = `
   .mantine-NumberInput-section:has(.mantine-NumberInput-controls) { width: 52px !important; }
   .mantine-Checkbox-inner, .mantine-Checkbox-input { width: 24px !important; height: 24px !important; }
   .mantine-Paper-root[role=button] { min-height: 24px; }
-  button[aria-pressed="true"] { background: var(--mantine-primary-color-light); font-weight: 700; }
   :focus-visible { outline: 2px solid #1b5fc1 !important; outline-offset: 2px; scroll-margin: 3em; }
   [data-mantine-color-scheme=dark] :focus-visible { outline-color: #7ab7ff !important; }
   [data-fa-copy], [data-fa-place="1"] { cursor: pointer; }

@@ -21,6 +21,12 @@ function say(text) {
   line.textContent = text;
 }
 
+function tellFor(text, milliseconds) {
+  say(text);
+  clearTimeout(clearing);
+  clearing = setTimeout(() => (wasLost ? say(words.lost) : rest()), milliseconds);
+}
+
 onConnection.push((there) => {
   clearTimeout(clearing);
   if (!there) {
@@ -28,8 +34,7 @@ onConnection.push((there) => {
     say(words.lost);
   } else if (wasLost) {
     wasLost = false;
-    say(words.back);
-    clearing = setTimeout(rest, BACK);
+    tellFor(words.back, BACK);
   }
 });
 
@@ -54,6 +59,7 @@ let rest = () => say("");
 
 function begin() {
   document.body.append(line, spoken);
+  set(document.getElementById("root"), "role", "main"); // a place to jump to
   if (!canDraw()) rest = () => say(words.no_webgl);
   rest();
 }
@@ -74,6 +80,7 @@ new MutationObserver(() => {
   nameControls();
   nameCopies();
   readPhoto();
+  keepUnfolded();
   nameHost();
   speak();
 }).observe(document, { childList: true, subtree: true });

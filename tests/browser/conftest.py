@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import importlib.resources
 import os
 import shutil
 import sys
@@ -125,3 +126,13 @@ def me(first_visitor: Visitor) -> Visitor:
     """The browser at a desk, at the first state."""
     first_visitor.start_again()
     return first_visitor
+
+
+@pytest.fixture(scope="module")
+def axe() -> str:
+    """The source of axe-core, of the wheel of axe-playwright-python."""
+    try:
+        file = importlib.resources.files("axe_playwright_python") / "axe.min.js"
+    except ModuleNotFoundError:
+        give_up("axe-core is not installed: pip install axe-playwright-python")
+    return file.read_text(encoding="utf-8")

@@ -23,7 +23,19 @@ from .data import data_meta
 from .door import VISER, ServeError
 
 # assets/page/*.js, joined in this order
-PARTS = ("channel", "look", "keys", "scene", "colours", "names", "copy", "photo", "probe", "status")
+PARTS = (
+    "channel",
+    "look",
+    "keys",
+    "scene",
+    "colours",
+    "names",
+    "copy",
+    "photo",
+    "probe",
+    "keep",
+    "status",
+)
 
 # viser sends the changes of a panel's controls through one sender, which every 50 ms keeps the newest message: a value
 # set less than 50 ms before another control changes never arrives. Ours keeps the newest of each control, in order,

@@ -1,0 +1,144 @@
+"""The page for everybody: what axe-core finds on every tab, keys alone, large letters, what is unfolded or emptied."""
+
+from __future__ import annotations
+
+import pytest
+
+from audit import CUT, SMALL, found_by_axe
+from visitor import Visitor
+
+pytestmark = pytest.mark.browser
+
+TABS = ("Explore", "View", "Compare", "Data", "Export")
+FOLDED = ".mantine-Paper-root[role=button][aria-expanded=false]"
+# What has the focus: its element, its name, its size and whether it is seen to have it
+FOCUSED = """() => { const e = document.activeElement; if (e === document.body || walked.has(e)) return null;
+  walked.add(e);
+  const box = e.getBoundingClientRect(), x = box.x + box.width / 2, y = box.y + box.height / 2;
+  const above = document.elementFromPoint(x, y);
+  return [e.ariaLabel || e.labels?.[0]?.textContent || e.textContent.trim(), box.width, box.height,
+    getComputedStyle(e).outlineStyle === 'solid' && above !== null && (e.contains(above) || above.contains(e))] }"""
+# What a person can do on a tab, but for the tabs themselves
+CONTROLS = """() => [...document.querySelectorAll('[role=slider], input:not([type=hidden], [type=file]), summary, ' +
+    'button:not([aria-hidden=true]), [role=button]')]
+  .filter(e => e.checkVisibility() && e.getBoundingClientRect().width && !e.closest('.mantine-Notification-root'))
+  .map(e => e.ariaLabel || e.labels?.[0]?.textContent || e.textContent.trim())"""
+SIDEWAYS = """() => [...document.querySelectorAll('.mantine-ScrollArea-viewport')]
+  .map(e => e.scrollWidth - e.clientWidth)"""
+WINDOWS = {"desktop": (1440, 900), "phone": (390, 844)}
+
+
+def unfold(me: Visitor) -> None:
+    """Every folder of the tab, by Enter."""
+    me.tab.wait_for_timeout(300)  # a tab that opens fades in
+    for _ in range(12):
+        folded = me.tab.locator(FOLDED).locator("visible=true")
+        if (left := folded.count()) == 0:
+            return
+        folded.first.focus()
+        me.tab.keyboard.press("Enter")
+        me.until(lambda n=left, f=folded: f.count() < n, "Enter opens no folder")
+    raise AssertionError("more folders than a tab has")
+
+
+def choose(me: Visitor, tab: str) -> None:
+    handle = me.tab.get_by_role("tab", name=tab, exact=True)
+    handle.focus()
+    me.tab.keyboard.press("Enter")
+    me.until(lambda: handle.get_attribute("aria-selected") == "true", f"Enter opens no {tab}")
+
+
+@pytest.mark.parametrize("name", WINDOWS)
+def test_on_every_tab_axe_finds_nothing_and_keys_reach_everything(visit, axe, name):
+    me = visit(*WINDOWS[name], dpr=0.2, query="surface=difference")
+    quiet = ".mantine-Notifications-root, .mantine-Notification-root { display: none !important }"
+    me.tab.add_style_tag(content=quiet + " * { transition: none !important }")
+    me.tab.evaluate(axe)
+    for tab in TABS:
+        choose(me, tab)
+        unfold(me)
+        for scheme in ("light", "dark"):
+            me.tab.emulate_media(color_scheme=scheme)
+            me.until(
+                lambda s=scheme: (
+                    me.tab.evaluate("() => document.documentElement.dataset.mantineColorScheme")
+                    == s
+                ),
+                f"the page does not become {scheme}",
+            )
+            assert not found_by_axe(me), (tab, scheme)
+        wanted = me.tab.evaluate(CONTROLS)
+        assert len(wanted) > 5, tab
+        assert all(wanted), f"{tab}: something has no name"
+        assert sorted(walked(me)) == sorted(wanted), tab
+    me.tab.context.close()
+
+
+def walked(me: Visitor) -> list[str]:
+    """Names of all that Tab goes through from the top of the page to its end, but tabs; each seen and large enough."""
+    me.tab.evaluate(
+        "() => { const first = document.createElement('span'); first.tabIndex = -1; document.body.prepend(first);"
+        " first.focus(); first.remove(); window.walked = new Set() }"
+    )
+    names = []
+    for _ in range(120):
+        me.tab.keyboard.press("Tab")
+        if (focused := me.tab.evaluate(FOCUSED)) is None:
+            return names
+        words, width, height, seen = focused
+        assert seen, f"{words} is covered, or its focus is not seen"
+        assert min(width, height) >= 24, f"{words}: {width} by {height}"
+        if me.tab.evaluate("() => document.activeElement.role !== 'tab'"):
+            names.append(words)
+    raise AssertionError(f"Tab never comes to an end: {names[-3:]}")
+
+
+@pytest.mark.parametrize("name", WINDOWS)
+def test_letters_of_twice_the_size_are_not_cut_off(visit, name):
+    me = visit(*WINDOWS[name], dpr=0.2, query="text=2")
+    for tab in TABS:
+        choose(me, tab)
+        unfold(me)
+        assert not me.tab.evaluate(CUT), tab
+        assert not me.tab.evaluate(SMALL), tab
+        assert max(me.tab.evaluate(SIDEWAYS)) <= 0, f"{tab} scrolls sideways"
+    me.tab.context.close()
+
+
+def test_what_is_unfolded_stays_so_with_its_focus_when_the_server_draws_it_anew(me):
+    summary = me.tab.locator("summary", has_text="The curves as numbers")
+    is_open = "() => document.querySelector('details')?.open"
+    for unfolded in (True, False):
+        summary.focus()
+        me.tab.keyboard.press("Enter")
+        me.until(lambda u=unfolded: me.tab.evaluate(is_open) == u, "Enter does not fold the table")
+        me.tab.evaluate("() => { document.querySelector('details').old = true }")
+        me.tab.keyboard.press("j")
+        drawn = "() => document.querySelector('details') && !document.querySelector('details').old"
+        me.until(lambda d=drawn: me.tab.evaluate(d), "the table was not sent again")
+        me.rest()
+        assert me.tab.evaluate(is_open) == unfolded
+        assert me.tab.evaluate("() => document.activeElement.tagName") == "SUMMARY"
+
+
+def test_a_number_counts_when_the_hand_rests_and_an_emptied_field_gets_its_value_back(me):
+    box = me.tab.get_by_label("Distance (cm)")
+    box.focus()
+    me.tab.keyboard.press("End")
+    for _ in range(3):
+        me.tab.keyboard.press("Backspace", delay=30)
+    assert box.input_value() == ""
+    me.tab.keyboard.press("Tab")
+    me.until(lambda: box.input_value() == "120", "the field stays empty")
+    me.rest()
+    assert me.state.distance == 1.2
+    assert not me.browser._history.past  # neither 12 nor 1 was told
+    box.focus()
+    me.tab.keyboard.press("End")
+    for key in ("Backspace", "Backspace", "Backspace", "6", "3"):  # 12 and 1 and 6 on the way
+        me.tab.keyboard.press(key)
+    me.until(lambda: me.state.distance == 0.63, "63 does not arrive by itself")
+    assert [state.distance for state in me.browser._history.past] == [1.2]
+    me.tab.keyboard.press("x")
+    me.tab.get_by_text("Type a number, for example 60.").first.wait_for()
+    assert box.input_value() == "63"
