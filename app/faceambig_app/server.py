@@ -10,7 +10,7 @@ import gc
 import math
 import signal
 import sys
-import threading
+import time
 from collections.abc import Collection
 from types import FrameType
 from typing import Any
@@ -147,13 +147,11 @@ def serve(
     limits: guard.Limits | None = None,
 ) -> int:
     """Serve the page until SIGINT or SIGTERM; the exit status."""
-    stopped = threading.Event()
-    status = 0
+    status: int | None = None
 
     def stop(number: int, _: FrameType | None) -> None:
         nonlocal status
         status = 130 if number == signal.SIGINT else 0
-        stopped.set()
 
     for number in (signal.SIGINT, signal.SIGTERM):  # before anybody can know that the page is there
         signal.signal(number, stop)
@@ -169,6 +167,9 @@ def serve(
         if sys.stdout.isatty():
             print(guard.qr_code(first))
     sys.stdout.flush()
-    stopped.wait()
+    while (
+        status is None
+    ):  # a wait without an end would sleep through a signal that comes just before it
+        time.sleep(0.1)
     page.close()
     return status
