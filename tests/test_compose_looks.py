@@ -181,10 +181,13 @@ def test_the_fitted_head_carries_the_millimetres_that_its_colours_mean():
     for surface, colours in (("difference", fc.difference_colours), ("depth", fc.depth_colours)):
         fit = composed(surface=surface).heads[1]
         region = MODEL.evaluation if MODEL.evaluation is not None else np.arange(MODEL.n_vertices)
+        assert fit.values_mm is not None
         assert np.isfinite(fit.values_mm[region]).all()
         assert np.isnan(np.delete(fit.values_mm, region)).all()
         assert np.array_equal(colours(MODEL, fit.values_mm[region]), fit.colours)
-    assert np.nanmin(fit.values_mm) < 0 < np.nanmax(fit.values_mm)  # of depth: both signs
+    assert fit.values_mm is not None and np.nanmin(fit.values_mm) < 0 < np.nanmax(
+        fit.values_mm
+    )  # of depth: both signs
     for head in (*composed(surface="skin").heads, composed(surface="depth").heads[0]):
         assert head.values_mm is None
 

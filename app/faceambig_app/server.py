@@ -11,7 +11,7 @@ import math
 import re
 import signal
 import sys
-import threading
+import time
 import warnings
 from collections.abc import Collection
 from types import FrameType
@@ -151,13 +151,11 @@ def serve(
     limits: guard.Limits | None = None,
 ) -> int:
     """Serve the page until SIGINT or SIGTERM; the exit status."""
-    stopped = threading.Event()
-    status = 0
+    status: int | None = None
 
     def stop(number: int, _: FrameType | None) -> None:
         nonlocal status
         status = 130 if number == signal.SIGINT else 0
-        stopped.set()
 
     # viser says it of every browser that leaves while something is drawn for it, with lines of its own source
     warnings.filterwarnings("ignore", CLOSED.pattern, UserWarning)
@@ -175,6 +173,9 @@ def serve(
         if sys.stdout.isatty():
             print(guard.qr_code(first))
     sys.stdout.flush()
-    stopped.wait()
+    while (
+        status is None
+    ):  # a wait without an end would sleep through a signal that comes just before it
+        time.sleep(0.1)
     page.close()
     return status

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from faceambig_app.faces import face
-from faceambig_app.state import ViewState
+from faceambig_app.state import DEFAULT, changed
 
 DOC = (Path(__file__).parents[2] / "docs" / "ambiguity.md").read_text(encoding="utf-8")
 
 
 def fitted(subject: int, data: str, **values: Any):
-    state = ViewState(subject=subject, actual=0.3, **{"distance": 0.3} | values, data=data)
+    state = changed(DEFAULT, subject=subject, actual=0.3, data=data, **{"distance": 0.3} | values)
     return face(state.target, state.fitting, state.bend)
 
 

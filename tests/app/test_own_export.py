@@ -15,6 +15,7 @@ import pytest
 
 import faceambig as fa
 from faceambig import compose
+from faceambig.metrics import surface_difference
 from faceambig.observation import portrait_camera
 from faceambig.render import overlay, painter
 from faceambig_app import export, own, own_export
@@ -45,7 +46,7 @@ def test_the_numbers_are_of_the_own_points_and_name_the_fit_they_are_compared_to
     assert name == "faceambig_photo_as_150cm_numbers.json"
     assert record["d_l_percent"] == pytest.approx(wanted.d_l_percent, rel=1e-6)
     assert record["alpha"] == pytest.approx(wanted.alpha.tolist(), abs=1e-6)
-    gap = fa.metrics.surface_difference(at_60.vertices(), wanted.vertices(), embedded.evaluation)
+    gap = surface_difference(at_60.vertices(), wanted.vertices(), embedded.evaluation)
     assert record["difference_mm"] == pytest.approx(gap.mean_mm, rel=1e-6)
     assert record["reference_distance_m"] == 0.6
     assert record["subject"] == "photo"

@@ -11,7 +11,7 @@ import msgspec
 from viser.infra import _infra
 
 from .door import DOOR, log_line
-from .sessions import SESSION, Session
+from .sessions import SESSION
 
 MAX_MESSAGE = 768 * 1024  # bytes; an upload arrives in parts of 512 KiB
 MAX_BAD = 40  # messages that mean nothing, before the connection is closed
@@ -32,7 +32,8 @@ async def consume(websocket: Any, handle_message: Any, message_class: Any) -> No
     while True:
         raw = await session.read(websocket)
         try:
-            message = _checked(session, raw, message_class)
+            message = _checked(raw, message_class, shown=session.shown)
+            session.shown = True  # none else is let through before the camera
         except (ValueError, TypeError, RecursionError, msgspec.MsgspecError) as error:
             bad += 1
             if bad == 1:
@@ -44,7 +45,8 @@ async def consume(websocket: Any, handle_message: Any, message_class: Any) -> No
         handle_message(message)
 
 
-def _checked(session: Session, raw: object, message_class: Any) -> Any:
+def _checked(raw: object, message_class: Any, *, shown: bool) -> Any:
+    """A message as it may come; `shown`: from a browser whose first camera has come."""
     if not isinstance(raw, bytes):
         raise TypeError("text instead of bytes")
     content = msgspec.msgpack.decode(raw)
@@ -57,11 +59,10 @@ def _checked(session: Session, raw: object, message_class: Any) -> Any:
     for name, holds in fields.items():
         if not holds(content[name]):
             raise ValueError(f"{kind}: {name}")
-    if not session.shown and kind != "ViewerCameraMessage":
+    if not shown and kind != "ViewerCameraMessage":
         raise ValueError(f"{kind}: before the first camera")
     message = message_class.deserialize(raw)
     if kind == "ViewerCameraMessage":
-        session.shown = True
         # A canvas without height has no aspect
         message.image_height = max(1, message.image_height)
         message.image_width = max(1, message.image_width)

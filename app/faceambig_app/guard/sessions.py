@@ -1,6 +1,6 @@
 """Sessions: how many browsers there may be, how fast each may speak, and when one is sent away.
 
-A message costs a look at the clock and two counters; all else is looked at once a second.
+A message costs two counters; all else is looked at once a second, or when a browser hurries.
 """
 
 from __future__ import annotations
@@ -55,9 +55,9 @@ class Session:
         self.shown = False  # whether its first camera has come
         self.at_work = 0
         self.buffer: AsyncMessageBuffer | None = None
-        self._opened = self._heard = self._loop.time()
-        self._allowance = limits.burst
-        self._paced = self._opened  # when it last was slower than it may be
+        self._opened = self._heard = self._paced = self._filled = self._loop.time()
+        self._count = self._heard_count = 0  # messages read; when it was last looked
+        self._free = limits.burst  # messages that may be read without a look at the clock
         self._closing: asyncio.Task[None] | None = None
         self._timer = self._loop.call_later(self._pause, self._look)
 
@@ -73,24 +73,31 @@ class Session:
     async def read(self, websocket: Any) -> Any:
         """The next message, when it is this browser's turn: TCP then slows the sender."""
         raw = await websocket.recv()
-        now, limits = self._loop.time(), self._limits
-        earned = (now - self._heard) * limits.rate
-        self._allowance = min(limits.burst, self._allowance + earned) - 1
-        self._heard = now
-        if self._allowance < 0:
-            if now - self._paced > limits.hurry:
-                await websocket.close(1008, "too fast")
-            await asyncio.sleep(-self._allowance / limits.rate)
-        elif self._allowance > limits.burst / 2:
-            self._paced = now
+        self._count += 1
+        if self._count > self._free:
+            await self._wait(websocket)
         while self.at_work > AT_WORK:
             await asyncio.sleep(0.01)
         return raw
+
+    async def _wait(self, websocket: Any) -> None:
+        """What it has earned since the last time is free again; with nothing earned it waits."""
+        now, limits = self._loop.time(), self._limits
+        earned = (now - self._filled) * limits.rate
+        self._free, self._filled = min(self._free + earned, self._count + limits.burst), now
+        if self._free > self._count + limits.burst / 2:
+            self._paced = now
+        elif self._count > self._free:
+            if now - self._paced > limits.hurry:
+                await websocket.close(1008, "too fast")
+            await asyncio.sleep((self._count - self._free) / limits.rate)
 
     def _look(self) -> None:
         if self._connection is None:
             return
         now = self._loop.time()
+        if self._count != self._heard_count:
+            self._heard, self._heard_count = now, self._count
         if not self.shown and now - self._opened > self._limits.first:
             self._close("no camera")
         elif now - self._heard > self._limits.idle:
