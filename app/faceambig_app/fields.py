@@ -23,6 +23,7 @@ Part = Literal["target", "fitting", "bend", "look", "page"]
 MODES = 3  # flexibility modes bent at once
 LAST_MODE = 100
 PINS = 5
+LAST_LESSON, LAST_STEP = 99, 20
 NAME_LENGTH = 1000  # characters of a model's name or path
 
 
@@ -121,6 +122,8 @@ _ROWS = (
         "pins", "pins", "page",
         f"up to {PINS} faces kept to compare, like distance:0.6..distance:2.4,subject:3",
     ),
+    Field("lesson", "index", "page", "number of the lesson", 1, LAST_LESSON),
+    Field("step", "whole", "page", "of the lesson", 1, LAST_STEP),
     Field(
         "theme", "choice", "page", "colours of the page",
         choices=("auto", "light", "dark"), view=True,

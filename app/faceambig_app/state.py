@@ -109,6 +109,8 @@ class ViewState(
     fade: float = 0.5
     hide: tuple[str, ...] = ()
     pins: tuple[ViewState, ...] = ()  # each as short() makes it, of this state's model
+    lesson: int | None = None
+    step: int = 1
     theme: str = "auto"
     text: float = 1.0
 
