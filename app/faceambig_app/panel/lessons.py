@@ -15,7 +15,7 @@ from ..state import ViewState
 from ..text import say
 from . import flex
 from .explore import NAMED_VIEWS, folder
-from .widgets import Change, Widgets
+from .widgets import MARKS_CM, Change, Widgets
 
 CHOICES = 5  # buttons for an answer
 
@@ -65,7 +65,8 @@ class Lessons:
         self._say.on_click(_heard(self._guess))
         self.flex = flex.sliders(w, visible=False)
         self._tools: dict[str, Sequence[Any]] = {
-            "actual": (w.distance("actual", visible=False),),
+            # Without the last mark: its words stand out of the panel, which would scroll sideways
+            "actual": (w.distance("actual", MARKS_CM[:-1], visible=False),),
             "data": (w.buttons("data", visible=False),),
             "camera": (w.buttons("camera", visible=False),),
             "view": (w.buttons("view", NAMED_VIEWS, visible=False),),

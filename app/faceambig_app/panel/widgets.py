@@ -62,10 +62,12 @@ class Widgets:
         """Call `watcher` with every state that is shown: for what is more than a value, such as what can be seen."""
         self._watchers.append(watcher)
 
-    def distance(self, name: str, *, visible: bool = True) -> viser.GuiSliderHandle[int]:
+    def distance(
+        self, name: str, marks_cm: Sequence[int] = MARKS_CM, *, visible: bool = True
+    ) -> viser.GuiSliderHandle[int]:
         """A slider over the steps of a distance."""
         field = FIELDS[name]
-        marks = [cm for cm in MARKS_CM if field.low <= cm / 100 <= field.high]
+        marks = [cm for cm in marks_cm if field.low <= cm / 100 <= field.high]
         handle = self.gui.add_slider(
             say(f"field.{name}"), 0, to_step(field, field.high), 1, to_step(field, field.low),
             marks=tuple((to_step(field, cm / 100), str(cm)) for cm in marks), hint=say(f"field.{name}_hint"),
