@@ -1,6 +1,6 @@
 """A learner in Chromium goes through lessons from start to end: by mouse, by touch on a phone, by keyboard alone.
 
-FACEAMBIG_LESSONS=all takes every lesson both ways, some minutes. Pictures of every step are kept in FACEAMBIG_ARTEFACTS.
+FACEAMBIG_LESSONS=all takes every lesson both ways, some minutes. Pictures of every step are in FACEAMBIG_ARTEFACTS.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Hand:
         track.tap(position={"x": share * box["width"], "y": box["height"] / 2}, force=True)
 
     def begin(self, lesson: Lesson) -> None:
-        box = self.me.tab.get_by_role("textbox", name=say("field.lesson"), exact=True)
+        box = self.me.tab.get_by_label(say("field.lesson"), exact=True).first
         option = self.me.tab.get_by_role("option", name=f"{lesson.number} {lesson.title}")
         if self.finger:
             box.tap()
@@ -202,7 +202,7 @@ class Keys(Hand):
         self.me.tab.keyboard.press("End" if share > 0.5 else "Home")
 
     def begin(self, lesson: Lesson) -> None:
-        self.tab_to(self.me.tab.get_by_role("textbox", name=say("field.lesson"), exact=True))
+        self.tab_to(self.me.tab.get_by_label(say("field.lesson"), exact=True).first)
         for key in ("ArrowDown", "ArrowDown", "Enter"):
             self.me.tab.keyboard.press(key)
             self.me.tab.wait_for_timeout(150)  # the list opens, and moves
