@@ -185,9 +185,8 @@ def test_the_fitted_head_carries_the_millimetres_that_its_colours_mean():
         assert np.isfinite(fit.values_mm[region]).all()
         assert np.isnan(np.delete(fit.values_mm, region)).all()
         assert np.array_equal(colours(MODEL, fit.values_mm[region]), fit.colours)
-    assert fit.values_mm is not None and np.nanmin(fit.values_mm) < 0 < np.nanmax(
-        fit.values_mm
-    )  # of depth: both signs
+    assert fit.values_mm is not None
+    assert np.nanmin(fit.values_mm) < 0 < np.nanmax(fit.values_mm)  # of depth: both signs
     for head in (*composed(surface="skin").heads, composed(surface="depth").heads[0]):
         assert head.values_mm is None
 

@@ -19,6 +19,8 @@ from .fields import FIELDS
 from .fits import model
 from .forms import command
 from .glide import Glide
+from .lesson_room import LessonRoom
+from .lessons import lessons
 from .link import query
 from .notices import cause, from_query
 from .orders import Orders
@@ -91,9 +93,14 @@ class Browser:
             show=lambda shown: self.panel.export.show(shown), notice=self.notice,
             own=lambda: self._own.photo,
         )  # fmt: skip
+        self._lessons = LessonRoom(
+            lessons(), now=lambda: self.room.state, tell=self.change, notice=self._remark,
+            show=lambda shown: self.panel.lesson.show(shown),
+        )  # fmt: skip
         self.panel = Panel(
             client.gui, people, self.change, self.act, narrow=self.stage.narrow,
             own=self._own, use_hint=self._use_hint, saving=self._saving,
+            lessons_do=self._lessons,
         )  # fmt: skip
         self._display = Display(client, self.stage, self.panel, gone=lambda: self.room.left)
         style = STYLE + figures.hidden_boxes(self.panel.widgets.step_sliders)
@@ -142,7 +149,14 @@ class Browser:
             case "redo":
                 self._travel(history.redo(self._history))
             case "reset":
-                self._travel(history.reset(self._history))
+                start = self._lessons.start(self.room.state)
+                self._travel(history.reset(self._history, start))
+            case "lesson_next":
+                self.change(self._lessons.onward)
+            case "lesson_back":
+                self.change(self._lessons.back)
+            case "lesson_leave":
+                self.change(self._lessons.leave)
             case "copy_link":
                 self.script.copy_link(query(self.room.state))
             case "copy_command":
@@ -165,6 +179,7 @@ class Browser:
             self._dress()
             self.script.theme(cast(Theme, to.now.theme), to.now.text)
         self.panel.show(to.now)
+        self._lessons.watch(to.now)
 
     def _opened(self, state: ViewState) -> None:
         """A state came in a file."""
@@ -201,7 +216,7 @@ class Browser:
                 self._dress()
             case Copied():
                 words = say("copy.done") if report.ok else say("copy.by_hand")
-                self._client.add_notification(say("app.title"), words, auto_close_seconds=3.0)
+                self._remark(words)
             case Point() | Click() | Gone():
                 self._own.hear(report)
             case Probe():
@@ -255,7 +270,7 @@ class Browser:
             state = changed(state, text=hello.text)
         for words in notices:
             self.notice(words)
-        self._travel(history.History(state))
+        self._travel(history.History(self._lessons.arrived(state)))
         self.room.open()
 
     def _dress(self) -> None:
@@ -290,6 +305,10 @@ class Browser:
         """A red line in this browser."""
         self._client.add_notification(say("app.title"), words, color="red", auto_close_seconds=8.0)
 
+    def _remark(self, words: str) -> None:
+        """A line that is no error."""
+        self._client.add_notification(say("app.title"), words, auto_close_seconds=3.0)
+
     def refuse(self, error: BaseException) -> None:
         """Say why a state could not be drawn; the last good frame stays."""
         log.warning("a frame failed: %s", cause(error))
@@ -313,6 +332,7 @@ class Browser:
             self.script.address(query(drawn))
             self.panel.flex.tell(rest.sliders)
             self._say_again(drawn)
+            self._lessons.watch(drawn, rest.numbers)
 
     def _say_again(self, state: ViewState) -> None:
         """The controls of a state at rest, those that nothing has changed too; of one that cannot be drawn as well."""

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import viser
 
-from faceambig.scene import Scene
+from faceambig.scene import Numbers, Scene
 
 from . import figures, own_page, photograph, pipeline, plots
 from .faces import curve_key
@@ -31,6 +31,7 @@ class Rest(NamedTuple):
 
     sliders: Sequence[Slider]  # of the flexibility modes
     hint: float | None  # metres: of the camera, as the own photograph's file tells it
+    numbers: Numbers
 
 
 class Display:
@@ -66,14 +67,18 @@ class Display:
         plot = plots.plots(plots_of(state), shown.scene.numbers, hide=state.hide)
         self._curves_of = curve_key(state.target, state.fitting)
         self._send([(self._panel.places.plots, plot), *self._others(state)])
-        return Rest(sliders_of(state), None)
+        return Rest(sliders_of(state), None, shown.scene.numbers)
 
     def _draw_own(self, own: OwnPhoto | None, state: ViewState, draft: bool) -> Rest | None:
         shown = own_frame(own, state, draft)
         self._send(self._own_contents(own, state, shown, draft), shown.scene, draft)
-        return None if draft else Rest(shown.sliders, told_distance(own, state))
+        if draft:
+            return None
+        return Rest(shown.sliders, told_distance(own, state), shown.scene.numbers)
 
     def _heading(self, state: ViewState, points: int) -> str:
+        if state.lesson is not None:  # whose text stands there
+            return ""
         actual = None if "actual" in state.hide else state.actual
         return figures.heading(state.fitting.distance, actual, points)
 

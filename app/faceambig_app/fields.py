@@ -24,6 +24,7 @@ Part = Literal["target", "fitting", "bend", "look", "page"]
 MODES = 3  # flexibility modes bent at once
 LAST_MODE = 100
 PINS = 5
+LAST_LESSON, LAST_STEP = 99, 20
 NAME_LENGTH = 1000  # characters of a model's name or path
 PIN_NAME_LENGTH = 30  # characters
 # Signs that would break a line, or turn round the words that follow: controls, half characters, marks of direction
@@ -130,6 +131,8 @@ _ROWS = (
         "pin_names", "words", "page",
         f"names of the kept faces in their order, up to {PIN_NAME_LENGTH} characters each, like Near,,Far",
     ),
+    Field("lesson", "index", "page", "number of the lesson", 1, LAST_LESSON),
+    Field("step", "whole", "page", "of the lesson", 1, LAST_STEP),
     Field(
         "theme", "choice", "page", "colours of the page",
         choices=("auto", "light", "dark"), view=True,

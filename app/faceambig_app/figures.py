@@ -60,7 +60,7 @@ def cards(numbers: Numbers, *, hide: Collection[str] = ()) -> str:
         say("number.d_l_note") if d_l_shown else say("number.hidden"), numbers.eyes_meaning,
     ) + _card(
         "fa-ds", title, d_s if d_s_shown else "?", "mm" if d_s_shown else "",
-        note if d_s_shown else say("number.hidden"), "",
+        note if d_s_shown else say("number.hidden_truth") if d_l_shown else say("number.hidden"), "",
     )  # fmt: skip
     return f'<div class="fa"><div class="fa-cards">{shown}</div>{warned}</div>'
 

@@ -36,45 +36,47 @@ def plots(
 ) -> str:
     """The curves against the assumed distance, the range that cannot be told apart in words, and a table.
 
-    `hide` of Scene: "numbers" leaves out words and table, "truth" the curve of d_S, "actual" the line of the true
-    distance. brief: without the table, for while a hand moves.
+    `hide` of Scene: "numbers" leaves out curves, words and table, "truth" the curve of d_S, "actual" the line of the
+    true distance. brief: without the table, for while a hand moves.
     """
-    told, true = "numbers" not in hide, "truth" not in hide
+    told = "numbers" not in hide
+    true = told and "truth" not in hide
     top = d_s_axis(curves, numbers)
-    words = escape(_alternative(curves, numbers) if told and true else say("plot.alt_hidden"))
-    ground = _ground(curves, numbers.reference, top, true, "actual" not in hide)
-    cursor, said = (
-        _cursor(numbers, top, _last(curves), true),
-        _said(curves, true, not brief) if told else "",
-    )
+    words = escape(_alternative(curves, numbers) if true else say("plot.alt_hidden"))
+    ground = _ground(curves, numbers.reference, top, told, true, "actual" not in hide)
+    cursor = _cursor(numbers, top, _last(curves, told), told, true)
+    said = _said(curves, true, not brief) if told else ""
     return (
-        f'<div class="fa"><div class="fa-wide"><svg class="fa-plot" viewBox="0 0 {WIDTH} {_ticks_at(curves) + 40}" '
+        f'<div class="fa"><div class="fa-wide">'
+        f'<svg class="fa-plot" viewBox="0 0 {WIDTH} {_ticks_at(curves, told) + 40}" '
         f'role="img" aria-label="{words}">{ground}{cursor}</svg></div>{said}</div>'
     )
 
 
-def _last(curves: Curves) -> int:
+def _last(curves: Curves, told: bool) -> int:
     """Where the lowest plot ends."""
-    return D_S_BOTTOM if curves.density is None else LIKELY_BOTTOM
+    return LIKELY_BOTTOM if told and curves.density is not None else D_S_BOTTOM
 
 
-def _ticks_at(curves: Curves) -> int:
-    return D_S_BOTTOM if curves.density is None else BARS_AT[0] + 7
+def _ticks_at(curves: Curves, told: bool) -> int:
+    return BARS_AT[0] + 7 if told and curves.density is not None else D_S_BOTTOM
 
 
 @lru_cache(maxsize=KEPT)
-def _ground(curves: Curves, reference: str, top: float, true: bool, actual: bool) -> str:
+def _ground(
+    curves: Curves, reference: str, top: float, told: bool, true: bool, actual: bool
+) -> str:
     """All of the plots but the cursor: what stays while a hand moves the distance."""
-    ticks_at = _ticks_at(curves)
+    ticks_at = _ticks_at(curves, told)
     parts = [
-        *_d_l_plot(curves),
-        *_d_s_plot(curves, reference, top, true),
-        *(() if curves.density is None else _likely_plot(curves)),
+        *_d_l_plot(curves, told),
+        *_d_s_plot(curves, reference, top, true, _hidden(told)),
+        *(_likely_plot(curves) if told and curves.density is not None else ()),
         *(_tick(cm, ticks_at) for cm in TICKS_CM),
         _far_tick(ticks_at),
         f'<text x="{(LEFT + RIGHT) / 2}" y="{ticks_at + 35}" text-anchor="middle">{escape(say("plot.axis"))}</text>',
-        _true_line(curves, _last(curves)) if actual else "",
-        _far_marks(curves, top, true),
+        _true_line(curves, _last(curves, told)) if actual else "",
+        _far_marks(curves, top, true) if told else "",
     ]
     return "".join(parts)
 
@@ -168,7 +170,12 @@ def _alternative(curves: Curves, numbers: Numbers) -> str:
     )
 
 
-def _d_l_plot(curves: Curves) -> list[str]:
+def _hidden(told: bool) -> str:
+    """Why a curve is not there."""
+    return say("number.hidden_truth") if told else say("number.hidden")
+
+
+def _d_l_plot(curves: Curves, told: bool) -> list[str]:
     band, automatic = _d_l(curves.tolerance_percent), _d_l(AUTOMATIC_PERCENT)
     line = _line(_x(curves.distances), _y(curves.d_l_percent, D_L_MAX, D_L_TOP, D_L_BOTTOM))
     return [
@@ -178,11 +185,13 @@ def _d_l_plot(curves: Curves) -> list[str]:
         f'<path d="M{LEFT} {automatic:.1f}H{END}" stroke="var(--fa-dim)" stroke-dasharray="5 4"/>',
         _note(automatic + 12, say("plot.automatic")),
         _note(band + 13, say("plot.band")),
-        f'<polyline points="{line}" fill="none" stroke="var(--fa-dl)" stroke-width="2.2" stroke-dasharray="6 3"/>',
+        f'<polyline points="{line}" fill="none" stroke="var(--fa-dl)" stroke-width="2.2" stroke-dasharray="6 3"/>'
+        if told
+        else "",
     ]
 
 
-def _d_s_plot(curves: Curves, reference: str, top: float, true: bool) -> list[str]:
+def _d_s_plot(curves: Curves, reference: str, top: float, true: bool, hidden: str) -> list[str]:
     line = _line(_x(curves.distances), _y(curves.d_s_mm, top, D_S_TOP, D_S_BOTTOM))
     title = say("plot.d_s_to", reference=reference) if reference else say("plot.d_s")
     return [
@@ -190,7 +199,7 @@ def _d_s_plot(curves: Curves, reference: str, top: float, true: bool) -> list[st
         *(_grid(value, top, D_S_TOP, D_S_BOTTOM) for value in range(0, int(top) + 1, 4)),
         f'<polyline points="{line}" fill="none" stroke="var(--fa-ds)" stroke-width="2.2"/>'
         if true
-        else _note((D_S_TOP + D_S_BOTTOM) / 2 + 4, say("number.hidden")),
+        else _note((D_S_TOP + D_S_BOTTOM) / 2 + 4, hidden),
     ]
 
 
@@ -303,13 +312,14 @@ def _true_line(curves: Curves, last: int) -> str:
     )
 
 
-def _cursor(numbers: Numbers, d_s_top: float, last: int, true: bool) -> str:
+def _cursor(numbers: Numbers, d_s_top: float, last: int, told: bool, true: bool) -> str:
     x = float(FAR) if numbers.distance is None else _across(numbers.distance)
     a, b = _d_l(numbers.d_l_percent), _at(numbers.d_s_mm, d_s_top, D_S_TOP, D_S_BOTTOM)
+    circle = f'<circle cx="{x:.1f}" cy="{a:.1f}" r="4.5" fill="var(--fa-dl)"/>'
     square = (
         f'<rect x="{x - 4.2:.1f}" y="{b - 4.2:.1f}" width="8.4" height="8.4" fill="var(--fa-ds)"/>'
     )
     return (
         f'<path d="{_upright(x, last)}" stroke="var(--fa-ink)" stroke-width="1.6"/>'
-        f'<circle cx="{x:.1f}" cy="{a:.1f}" r="4.5" fill="var(--fa-dl)"/>{square if true else ""}'
+        f"{circle if told else ''}{square if true else ''}"
     )

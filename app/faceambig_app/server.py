@@ -23,6 +23,7 @@ from . import guard
 from .browser import Browser
 from .fields import FIELDS
 from .fits import model
+from .lessons import lessons
 from .orders import Orders
 from .panel.data import POINTS
 from .panel.export import STATES
@@ -49,6 +50,7 @@ class Page:
     ) -> None:
         model(DEFAULT.model)  # before the first browser comes
         frame(DEFAULT)
+        lessons()
         self._dispatcher, self._orders = Dispatcher(), Orders()
         self._browsers: dict[int, Browser] = {}
         hooks = guard.Hooks(words=refusal, on_refused=self._refused, on_error=self._failed)

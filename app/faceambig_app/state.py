@@ -113,6 +113,8 @@ class ViewState(
     hide: tuple[str, ...] = ()
     pins: tuple[ViewState, ...] = ()  # each as short() makes it, of this state's model
     pin_names: tuple[str, ...] = ()  # of the pins in their order; "" or missing: by its number
+    lesson: int | None = None
+    step: int = 1
     theme: str = "auto"
     text: float = 1.0
 

@@ -47,6 +47,18 @@ font-variant-numeric:tabular-nums;line-height:1.15;display:block}
 .fa-over{text-align:center;white-space:nowrap}.fa-over i{display:block;height:14px;min-width:24px}
 """
 
+_LESSON = """
+.fa-steps{display:flex;gap:6px;margin-top:.6em}
+.fa-steps i{flex:1;height:5px;border-radius:3px;background:var(--fa-line)}
+.fa-steps .fa-on{background:var(--fa-dl)}.fa-lesson{overflow-wrap:anywhere;padding-right:1.25em}
+.fa-lesson ul,.fa-lesson ol{margin:.3em 0;padding-left:1.4em}
+.fa-said{border-left:4px solid var(--fa-dl);padding-left:8px}
+.fa .fa-tasks{list-style:none;padding:0}.fa-tasks li{display:grid;grid-template-columns:1.6em 1fr;margin:.25em 0}
+.fa-tasks span{display:inline-block;width:1.1em;height:1.1em;line-height:1.1em;text-align:center;border-radius:3px;
+border:1.5px solid var(--fa-dim);color:var(--fa-dl);font-weight:700;margin-top:.15em}
+.fa-done span{border-color:var(--fa-dl)}
+"""
+
 _PHOTO = """
 .fa-photo{position:relative;border-radius:8px;overflow:hidden;background-color:#CBD5E0;background-size:100% 100%;
 aspect-ratio:1}.fa-photo svg{position:absolute;inset:0;width:100%;height:100%}
@@ -92,7 +104,7 @@ button[aria-pressed=true]{background:var(--fa-dl)!important;color:var(--fa-on)!i
 .fa-card span{font-size:calc(22px*var(--fa-scale,1))}}
 """
 
-STYLE = f"<style>{_TOKENS}{_TEXT}{_CARDS}{_PHOTO}{_PLOTS}{_VISER}</style>"
+STYLE = f"<style>{_TOKENS}{_TEXT}{_CARDS}{_LESSON}{_PHOTO}{_PLOTS}{_VISER}</style>"
 
 
 def text_size(scale: float) -> str:

@@ -354,6 +354,8 @@ WRITTEN: dict[str, tuple[str, dict[str, Any]]] = {
         "default..distance:0.6,flex:1:3,flex:2:-4",
         {"pins": (DEFAULT, changed(DEFAULT, distance=0.6, flex=[(1, 3.0), (2, -4.0)]))},
     ),
+    "lesson": ("2", {"lesson": 2}),
+    "step": ("3", {"step": 3}),
     "theme": ("dark", {"theme": "dark"}),
     "text": ("1.25", {"text": 1.25}),
 }

@@ -158,6 +158,8 @@ def test_what_is_hidden_cannot_be_read_anywhere():
     assert "5.3" not in numbers
     assert "0.25" not in numbers
     assert "<table" not in marked
+    assert "<polyline" not in marked  # a curve tells as much as its numbers
+    assert "<circle" not in marked
     assert numbers.count("?") == 2
     assert "5.3" not in truth
     assert "0.25" in truth

@@ -67,6 +67,7 @@ def panel_of(state: ViewState, saving: Any = None) -> tuple[Panel, Gui, list[Cha
     panel = Panel(
         made, {1: "a", 2: "b", 3: "c"}, told.append, acts.append, narrow=True,
         own=MagicMock(), use_hint=lambda: None, saving=saving or MagicMock(),
+        lessons_do=MagicMock(),
     )  # fmt: skip
     panel.show(state)
     return panel, gui, told, acts

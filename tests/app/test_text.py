@@ -18,7 +18,7 @@ from faceambig.errors import AssetError
 from faceambig_app import own, panel, text
 from faceambig_app.actions import ACTIONS
 from faceambig_app.guard import page
-from faceambig_app.panel import compare, data, explore, flex, view, widgets
+from faceambig_app.panel import compare, data, explore, flex, lessons, view, widgets
 from faceambig_app.state import DEFAULT
 from faceambig_app.text import centimetres, distance_text, percent_number, say, words
 
@@ -74,7 +74,7 @@ def recorded(monkeypatch: pytest.MonkeyPatch) -> set[str]:
         seen.add(key)
         return say(key, **values)
 
-    for module in (panel, compare, data, explore, flex, view, widgets):
+    for module in (panel, compare, data, explore, flex, lessons, view, widgets):
         if hasattr(module, "say"):
             monkeypatch.setattr(module, "say", heard)
     return seen
@@ -91,6 +91,7 @@ def test_every_word_of_the_file_is_asked_for(recorded):
         own=MagicMock(),
         use_hint=lambda: None,
         saving=MagicMock(),
+        lessons_do=MagicMock(),
     )
     shown.spoken(DEFAULT)
     exact = {ask.replace("\\", "") for _, ask in ASKED if "[" not in ask}

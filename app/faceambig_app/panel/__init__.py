@@ -14,7 +14,7 @@ import viser
 from ..guard import data_html
 from ..state import ViewState
 from ..text import distance_text, say
-from . import compare, data, explore, export, flex, view
+from . import compare, data, explore, export, flex, lessons, view
 from .widgets import Change as Change
 from .widgets import Tell, Widgets
 
@@ -58,16 +58,17 @@ class Panel:
         own: data.Does,
         use_hint: Callable[[], None],
         saving: export.Does,
+        lessons_do: lessons.Does,
     ) -> None:
         self.widgets = w = Widgets(gui, tell, act)
         gui.set_panel_label(say("app.title"))
         style = gui.add_html("")
         if narrow:  # one panel: the photograph comes first, beside the numbers
-            photo = _photo(gui)
+            photo = self._photo(w, lessons_do)
         else:
             side = gui.add_panel()
             with side.add_tab(say("panel.photo")):
-                photo = _photo(gui)
+                photo = self._photo(w, lessons_do)
             side.dock_left()
             side.set_width(SIDE_WIDTH)
         tabs = gui.add_tab_group()
@@ -75,7 +76,7 @@ class Panel:
             explore.build_first(w)
             cards, legend, plots = gui.add_html(""), gui.add_html(""), gui.add_html("")
             explore.build_photo(w, people)
-            self.flex = flex.Flex(w)
+            self.flex = flex.Flex(w, self.lesson.flex)
             explore.build_data(w)
             explore.build_history(w)
         with tabs.add_tab(say("panel.view")):
@@ -91,6 +92,14 @@ class Panel:
         gui.main_panel.set_width(SIDE_WIDTH)
         folded = self.flex.words, self.flex.spectrum
         self.places = Places(style, *photo, cards, plots, legend, *folded, pins, spoken, told)
+
+    def _photo(self, w: Widgets, lessons_do: lessons.Does) -> Photograph:
+        """The places of the heading, the photograph, its crosses and its circles; the lesson between them."""
+        heading = w.gui.add_html("")
+        self.lesson = lessons.Lessons(w, lessons_do)
+        photo = w.gui.add_html(""), w.gui.add_html(""), w.gui.add_html("")
+        self.lesson.build_list()
+        return heading, *photo
 
     @property
     def controls(self) -> tuple[viser.GuiInputHandle, ...]:
@@ -108,8 +117,3 @@ class Panel:
             for name in ("distance", "actual")
         }
         return data_html("pressed", self.widgets.pressed(state)) + data_html("valuetext", texts)
-
-
-def _photo(gui: viser.GuiApi) -> Photograph:
-    """The places of the heading, the photograph, its crosses and its circles."""
-    return gui.add_html(""), gui.add_html(""), gui.add_html(""), gui.add_html("")

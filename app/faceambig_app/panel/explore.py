@@ -52,6 +52,6 @@ def build_history(w: Widgets) -> None:
     w.actions("history", ("undo", "redo", "reset", "copy_link"))
 
 
-def folder(w: Widgets, name: str) -> viser.GuiFolderHandle:
+def folder(w: Widgets, name: str, *, visible: bool = True) -> viser.GuiFolderHandle:
     """A folder that a newcomer need not open."""
-    return w.gui.add_folder(say(f"folder.{name}"), expand_by_default=False)
+    return w.gui.add_folder(say(f"folder.{name}"), expand_by_default=False, visible=visible)

@@ -23,9 +23,10 @@ Marks = tuple[tuple[float, str], ...]
 class Flex:
     """The folder, its sliders, and the elements that say what the modes move."""
 
-    def __init__(self, w: Widgets) -> None:
+    def __init__(self, w: Widgets, elsewhere: Sequence[viser.GuiSliderHandle[float]] = ()) -> None:
+        """elsewhere: the same sliders, made by `sliders`, that stand at another place too."""
         with folder(w, "flex"):
-            self._sliders = [_slider(w, k, letter) for k, letter in enumerate(LETTERS)]
+            self._sliders = [*sliders(w), *elsewhere]
             w.actions("flex_modes", ("next_modes", "unbend"))
             self._strength = w.gui.add_slider(
                 say("field.strength"), 0.0, 10.0, 0.5, STRENGTH, hint=say("field.strength_hint")
@@ -33,7 +34,7 @@ class Flex:
             self._others(w)
             self.words = w.gui.add_html("")
             self.spectrum = w.gui.add_html("")
-        self._told: list[tuple[str, Marks]] = [("", ())] * MODES
+        self._told: list[tuple[str, Marks]] = [("", ())] * len(self._sliders)
 
     def _others(self, w: Widgets) -> None:
         """Whole faces behind the same points: mixed, farthest apart, drawn."""
@@ -48,18 +49,26 @@ class Flex:
     def tell(self, sliders: Sequence[tuple[str, Marks]]) -> None:
         """Label and marks (mm, words) of each slider, in the order of LETTERS; one that is missing has no mode."""
         for k, handle in enumerate(self._sliders):
-            told = sliders[k] if k < len(sliders) else (say("field.flex", letter=LETTERS[k]), ())
-            handle.disabled = k >= len(sliders)
+            place = k % MODES
+            there = place < len(sliders)
+            told = sliders[place] if there else (say("field.flex", letter=LETTERS[place]), ())
+            handle.disabled = not there
             if told != self._told[k]:
                 self._told[k] = told
                 handle.label = told[0]
                 handle._marks = tuple(GuiSliderMark(value=mm, label=words) for mm, words in told[1])
 
 
-def _slider(w: Widgets, place: int, letter: str) -> viser.GuiSliderHandle[float]:
+def sliders(w: Widgets, *, visible: bool = True) -> list[viser.GuiSliderHandle[float]]:
+    """The sliders of the modes that have some."""
+    return [_slider(w, k, letter, visible) for k, letter in enumerate(LETTERS)]
+
+
+def _slider(w: Widgets, place: int, letter: str, visible: bool) -> viser.GuiSliderHandle[float]:
     field = FIELDS["flex"]
     handle = w.gui.add_slider(
-        say("field.flex", letter=letter), field.low, field.high, field.step, 0.0, hint=say("field.flex_hint")
+        say("field.flex", letter=letter), field.low, field.high, field.step, 0.0, hint=say("field.flex_hint"),
+        visible=visible,
     )  # fmt: skip
     w.bind(handle, _millimetres(place), _bent(place))
     return handle

@@ -72,17 +72,21 @@ class Widgets:
         self._watched.append((read, tell))
         self._seen.append(_NOTHING)
 
-    def distance(self, name: str) -> None:
+    def distance(
+        self, name: str, marks_cm: Sequence[int] = MARKS_CM, *, visible: bool = True
+    ) -> viser.GuiSliderHandle[int]:
         """A slider over the steps of a distance."""
         field = FIELDS[name]
-        marks = [cm for cm in MARKS_CM if field.low <= cm / 100 <= field.high]
+        marks = [cm for cm in marks_cm if field.low <= cm / 100 <= field.high]
         handle = self.gui.add_slider(
             say(f"field.{name}"), 0, to_step(field, field.high), 1, to_step(field, field.low),
             marks=tuple((to_step(field, cm / 100), str(cm)) for cm in marks), hint=say(f"field.{name}_hint"),
+            visible=visible,
         )  # fmt: skip
         self._steps.append(handle._impl.uuid)
         self.bind(handle, lambda state: to_step(field, getattr(state, name)),
                   lambda step: setting(name, from_step(field, step)))  # fmt: skip
+        return handle
 
     def centimetres(self, name: str, label: str) -> None:
         """A number field for a distance, in centimetres, to a tenth."""
@@ -117,17 +121,22 @@ class Widgets:
             handle, lambda state: getattr(state, name), lambda value: setting(name, kind(value))
         )
 
-    def buttons(self, name: str, choices: Sequence[str | int] | None = None) -> None:
+    def buttons(
+        self, name: str, choices: Sequence[str | int] | None = None, *, visible: bool = True
+    ) -> viser.GuiButtonGroupHandle:
         """A row of buttons, one a choice."""
         by_label = {
             say(f"{name}.{choice}"): choice
             for choice in (FIELDS[name].choices if choices is None else choices)
         }
         label = say(f"field.{name}")
-        handle = self.gui.add_button_group(label, tuple(by_label), hint=say(f"field.{name}_hint"))
+        handle = self.gui.add_button_group(
+            label, tuple(by_label), hint=say(f"field.{name}_hint"), visible=visible
+        )
         handle.on_click(self.heard(lambda option: setting(name, by_label[option])))
         labels = {choice: option for option, choice in by_label.items()}
         self._pressed[label] = lambda state: labels.get(getattr(state, name), "")
+        return handle
 
     def dropdown(self, name: str, choices: Mapping[Any, str]) -> None:
         """A list to choose from: value -> words."""
@@ -159,11 +168,14 @@ class Widgets:
         handle.on_click(self.acted(lambda _: name))
         return handle
 
-    def actions(self, label: str, names: Sequence[str]) -> None:
+    def actions(
+        self, label: str, names: Sequence[str], *, visible: bool = True
+    ) -> viser.GuiButtonGroupHandle:
         """A row of buttons, one an action; words at field.`label`."""
         by_label = {say(f"action.{name}"): name for name in names}
-        handle = self.gui.add_button_group(say(f"field.{label}"), tuple(by_label))
+        handle = self.gui.add_button_group(say(f"field.{label}"), tuple(by_label), visible=visible)
         handle.on_click(self.acted(lambda option: by_label[option]))
+        return handle
 
     def bind(
         self, handle: viser.GuiInputHandle[Any], read: Callable[[ViewState], Any], write: Callable[[Any], Change]
