@@ -64,12 +64,13 @@ def silent(step: Step) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Rows as they are printed and written as CSV, with all digits."""
+    """Named columns of numbers and words. Numbers with all their digits: rounded only where people read them."""
 
     title: str
     columns: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
     note: str = ""
+    decimals: int = 2  # of numbers where they are shown to people
 
     def __post_init__(self) -> None:
         for row in self.rows:
