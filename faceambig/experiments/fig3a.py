@@ -68,7 +68,7 @@ def run(settings: Settings, progress: Progress) -> Outcome:
     ratio = np.median(cost[:, :, 0] / cost[:, :, 1], axis=0)
     mean = d_s.mean(axis=0)
     rows = [
-        (case.words, *mean[k, :, 0].tolist(), *mean[k, :, 1].tolist(), *nearer[k].tolist(), ratio[k])
+        (case.words, *mean[k, :, 0].tolist(), *mean[k, :, 1].tolist(), *nearer[k].tolist(), float(ratio[k]))
         for k, case in enumerate(CASES)
     ]  # fmt: skip
     columns = (

@@ -30,6 +30,8 @@ Numbers = dict[str, NDArray[Any]]
 Work = Callable[[FaceModel, Item], Mapping[str, ArrayLike]]
 Chunk = list[Numbers]
 
+RAY_AT_ONCE = 64  # chunks
+
 _MODELS: dict[str, FaceModel] = {}  # of a worker: a model that came before is not kept twice
 
 
@@ -87,9 +89,15 @@ def _run(
     joblib = _imported("joblib", "batch")
     with ExitStack() as stack:
         stack.enter_context(_backend(joblib, settings, stack))
-        parallel = joblib.Parallel(n_jobs=settings.n_jobs, return_as="generator_unordered")
         work = joblib.delayed(_chunk)
-        yield from parallel(work(k, part, function, model, digest) for k, part in jobs)
+        calls = [work(k, part, function, model, digest) for k, part in jobs]
+        if settings.backend != "ray":
+            parallel = joblib.Parallel(n_jobs=settings.n_jobs, return_as="generator_unordered")
+            yield from parallel(calls)
+            return
+        # Ray's backend answers when all of a call is done: a few at a time, so that they are kept and progress is told
+        for first in range(0, len(calls), RAY_AT_ONCE):
+            yield from joblib.Parallel(n_jobs=settings.n_jobs)(calls[first : first + RAY_AT_ONCE])
 
 
 def _backend(joblib: Any, settings: Settings, stack: ExitStack) -> Any:

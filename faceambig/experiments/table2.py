@@ -119,7 +119,7 @@ def eos_shape(model: FaceModel, photo: Observation, iterations: int = 50) -> Arr
     whole = eos.morphablemodel.MorphableModel(shape, [still], eos.morphablemodel.PcaModel())
     names = [str(k) for k in range(len(vertices))]
     points = [eos.core.Landmark(name, x) for name, x in zip(names, photo.points, strict=True)]
-    mapper = eos.core.LandmarkMapper({name: name for name in names})
+    mapper = eos.core.LandmarkMapper()  # by name
     assert photo.image_size is not None  # observe gives one
     found = eos.fitting.fit_shape_and_pose(
         whole, points, mapper, *photo.image_size, num_iterations=iterations
