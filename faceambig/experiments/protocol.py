@@ -15,7 +15,24 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..chart import Chart, Line
 from ..model import FaceModel
+
+__all__ = [
+    "Backend",
+    "Cell",
+    "Chart",
+    "Claim",
+    "Experiment",
+    "Image",
+    "Line",
+    "Outcome",
+    "Progress",
+    "Settings",
+    "Step",
+    "Table",
+    "silent",
+]
 
 Backend = Literal["loky", "dask", "ray"]
 Cell = str | float | int | None
@@ -78,38 +95,6 @@ class Table:
                 raise ValueError(
                     f"rows: {len(row)} cells in {self.title!r}, of {len(self.columns)} columns"
                 )
-
-
-@dataclass(frozen=True, slots=True)
-class Line:
-    """One curve of a chart; of a bar chart one colour."""
-
-    label: str
-    x: tuple[float, ...]
-    y: tuple[float, ...]
-    low: tuple[float, ...] | None = None  # a band about the curve
-    high: tuple[float, ...] | None = None
-
-    def __post_init__(self) -> None:
-        for values in (self.y, self.low, self.high):
-            if values is not None and len(values) != len(self.x):
-                raise ValueError(
-                    f"y: {len(values)} values in {self.label!r} for {len(self.x)} of x"
-                )
-
-
-@dataclass(frozen=True, slots=True)
-class Chart:
-    """Curves, or bars side by side, over one axis."""
-
-    title: str
-    x_label: str
-    y_label: str
-    lines: tuple[Line, ...]
-    log_x: bool = False
-    log_y: bool = False
-    bars: bool = False
-    ticks: tuple[str, ...] = ()  # names of the places on the x axis, of bars: one for each x
 
 
 @dataclass(frozen=True, slots=True, eq=False)
