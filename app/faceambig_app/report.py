@@ -43,20 +43,22 @@ class Drawn(NamedTuple):
     file: str
     words: str  # for those who do not see it
     png: bytes
+    titled: bool  # the words are in the picture
 
 
 def drawn(outcome: Outcome) -> list[Drawn]:
     """Its charts and images, in order."""
-    pictures = [
-        (f"chart{k}", chart.title, draw_chart(chart)) for k, chart in enumerate(outcome.charts, 1)
+    charts = [
+        Drawn(
+            f"{outcome.name}_chart{k}.png", chart.title, _png(draw_chart(chart), chart.title), True
+        )
+        for k, chart in enumerate(outcome.charts, 1)
     ]
-    pictures += [
-        (f"image{k}", image.title, image.pixels) for k, image in enumerate(outcome.images, 1)
+    images = [
+        Drawn(f"{outcome.name}_image{k}.png", image.title, _png(image.pixels, image.title), False)
+        for k, image in enumerate(outcome.images, 1)
     ]
-    return [
-        Drawn(f"{outcome.name}_{part}.png", title, _png(pixels, title))
-        for part, title, pixels in pictures
-    ]  # fmt: skip
+    return charts + images
 
 
 def files_of(outcome: Outcome, pictures: Sequence[Drawn]) -> dict[str, bytes]:
@@ -152,11 +154,7 @@ def _section(done: Done, pictures: Sequence[Drawn]) -> str:
         claims.append(f"<tr>{row}{_verdict_cell(claim)}</tr>")
         if claim.why:
             claims.append(f'<tr class="why"><td colspan="4">{escape(claim.why)}</td></tr>')
-    figures = [
-        f'<figure><img alt="{escape(each.words)}" src="data:image/png;base64,{base64.b64encode(each.png).decode()}">'
-        f"<figcaption>{escape(each.words)}</figcaption></figure>"
-        for each in pictures
-    ]
+    figures = [_figure(picture) for picture in pictures]
     tables = [_outcome_table(table) for table in outcome.tables]
     return "\n".join(
         (
@@ -170,20 +168,36 @@ def _section(done: Done, pictures: Sequence[Drawn]) -> str:
     )
 
 
+def _figure(picture: Drawn) -> str:
+    data = base64.b64encode(picture.png).decode()
+    words = escape(picture.words)
+    below = "" if picture.titled else f"<figcaption>{words}</figcaption>"
+    return f'<figure><img alt="{words}" src="data:image/png;base64,{data}">{below}</figure>'
+
+
 def _outcome_table(table: Table) -> str:
     rows = []
     for row in table.rows:
-        cells = [
-            f"<td{'' if isinstance(cell, str) else ' class=number'}>{escape(shown(cell, table.decimals))}</td>"
-            for cell in row
-        ]
+        cells = [f"<td{_right(cell)}>{escape(shown(cell, table.decimals))}</td>" for cell in row]
         rows.append(f"<tr>{''.join(cells)}</tr>")
     note = f" ({table.note})" if table.note else ""
-    return _table_html(f"{table.title}{note}", table.columns, rows)
+    sides = [_right(cell) for cell in table.rows[0]] if table.rows else []
+    return _table_html(f"{table.title}{note}", table.columns, rows, sides)
 
 
-def _table_html(caption: str, columns: Sequence[str], rows: Sequence[str]) -> str:
-    head = "".join(f'<th scope="col">{escape(column)}</th>' for column in columns)
+def _right(cell: Cell) -> str:
+    """Numbers stand at the right of their column."""
+    return "" if isinstance(cell, str) else ' class="number"'
+
+
+def _table_html(
+    caption: str, columns: Sequence[str], rows: Sequence[str], sides: Sequence[str] = ()
+) -> str:
+    """sides: attributes of the columns' heads."""
+    head = "".join(
+        f'<th scope="col"{sides[k] if sides else ""}>{escape(column)}</th>'
+        for k, column in enumerate(columns)
+    )
     return (
         f'<div class="wide"><table><caption>{escape(caption)}</caption>\n<thead><tr>{head}</tr></thead>\n'
         f"<tbody>{''.join(rows)}</tbody></table></div>"

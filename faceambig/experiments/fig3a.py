@@ -59,7 +59,7 @@ METHODS: dict[str, dict[str, Any]] = {
 
 def run(settings: Settings, progress: Progress) -> Outcome:
     """d_S of both solvers for every head left out."""
-    n = min(settings.subjects(usual=POPULATION, quick=12), POPULATION)
+    n = min(settings.subjects(usual=POPULATION, quick=8), POPULATION)
     work = partial(left_out, seed=settings.seed)
     found = over_subjects(work, range(1, n + 1), settings, progress, what="heads left out")
     d_s = np.stack([one["d_s"] for one in found])  # (n, cases, methods, rigid and with scale)

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from functools import lru_cache, partial
 from importlib import import_module
+from itertools import islice
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -90,14 +91,14 @@ def _run(
     with ExitStack() as stack:
         stack.enter_context(_backend(joblib, settings, stack))
         work = joblib.delayed(_chunk)
-        calls = [work(k, part, function, model, digest) for k, part in jobs]
+        calls = (work(k, part, function, model, digest) for k, part in jobs)
         if settings.backend != "ray":
             parallel = joblib.Parallel(n_jobs=settings.n_jobs, return_as="generator_unordered")
             yield from parallel(calls)
             return
         # Ray's backend answers when all of a call is done: a few at a time, so that they are kept and progress is told
-        for first in range(0, len(calls), RAY_AT_ONCE):
-            yield from joblib.Parallel(n_jobs=settings.n_jobs)(calls[first : first + RAY_AT_ONCE])
+        while some := list(islice(calls, RAY_AT_ONCE)):
+            yield from joblib.Parallel(n_jobs=settings.n_jobs)(some)
 
 
 def _backend(joblib: Any, settings: Settings, stack: ExitStack) -> Any:
@@ -225,7 +226,7 @@ def _kept(file: Path | None) -> Chunk | None:
     if file is None or not file.is_file():
         return None
     try:
-        with np.load(file, allow_pickle=False) as stored:
+        with file.open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
             part: Chunk = [{} for _ in range(int(stored["n"]))]
             for key in stored.files:
                 k, _, name = key.partition(":")

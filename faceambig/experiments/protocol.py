@@ -112,7 +112,7 @@ class Claim:
     words: str  # what the paper says
     paper: str  # its number
     ours: str  # the number found
-    holds: bool | None  # None: cannot be compared
+    holds: bool | None  # None: cannot be compared, or too close to be told
     why: str = ""  # a sentence on what differs and why
 
 

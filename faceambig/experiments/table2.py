@@ -49,7 +49,8 @@ def run(settings: Settings, progress: Progress) -> Outcome:
     names = (*METHODS, "the mean face", *((EOS,) if find_spec("eos") else ()))
     work = partial(errors, seed=settings.seed, with_eos=EOS in names)
     found = over_subjects(work, range(1, n + 1), settings, progress)
-    d_s = np.stack([one["d_s"] for one in found]).mean(axis=0)  # (methods, yaws)
+    each = np.stack([one["d_s"] for one in found])  # (n, methods, yaws)
+    d_s = each.mean(axis=0)
     rows = [
         (name, *values.tolist(), float(values.mean()))
         for name, values in zip(names, d_s, strict=True)
@@ -70,7 +71,7 @@ def run(settings: Settings, progress: Progress) -> Outcome:
             Table("The paper's", columns, tuple((name, *row) for name, row in PAPER.items())),
         ),
         (chart,),
-        claims=_claims(mean),
+        claims=_claims(mean, _gain(each, names)),
         settings={
             "subjects": who(settings, n),
             "fit": f"orthographic, {MODES} modes, box {BOX:g} sd; ALS of 10 rounds",
@@ -127,17 +128,27 @@ def eos_shape(model: FaceModel, photo: Observation, iterations: int = 50) -> Arr
     return np.array(found[2], dtype=float)
 
 
-def _claims(mean: Mapping[str, float]) -> tuple[Claim, ...]:
+def _gain(d_s: Array, names: tuple[str, ...]) -> tuple[float, float]:
+    """How much nearer SNLS is than ALS with the prior of the noise, mm, over the heads: mean and standard error."""
+    by_head = dict(zip(names, d_s.mean(axis=2).T, strict=True))
+    gain = by_head["ALS, prior of the noise"] - by_head["SNLS, prior of the noise"]
+    return float(gain.mean()), float(gain.std(ddof=1) / sqrt(len(gain)))
+
+
+def _claims(mean: Mapping[str, float], gain: tuple[float, float]) -> tuple[Claim, ...]:
     als, snls = mean["ALS, prior of the noise"], mean["SNLS, prior of the noise"]
     light = mean["ALS, light prior"], mean["SNLS, light prior"]
+    told = abs(gain[0]) > 2 * gain[1]
     return (
         Claim(
             "SNLS is nearer to the truth than the alternating fit",
             "4.21 against 4.81 mm (Zhu et al. 2015)",
-            f"{snls:.2f} against {als:.2f} mm with a prior that knows the noise; {light[1]:.2f} against "
-            f"{light[0]:.2f} mm with the light one",
-            snls <= als,
-            "Zhu et al. alternate and add contours. With the light prior the better optimum follows the noise.",
+            f"{snls:.2f} against {als:.2f} mm with a prior that knows the noise, {gain[0]:.2f} mm nearer with a "
+            f"standard error of {gain[1]:.2f}; {light[1]:.2f} against {light[0]:.2f} mm with the light prior",
+            gain[0] > 0 if told else None,
+            "Zhu et al. alternate, too, and add contours. With the light prior the better optimum follows the noise, "
+            "which rounds that stop early do not reach; with the other the two are "
+            + ("told apart." if told else "within two standard errors of each other."),
         ),
         Claim(
             "shape is recovered from a detector's landmarks",

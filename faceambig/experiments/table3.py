@@ -45,7 +45,7 @@ PAPER_D_S = (
 
 def run(settings: Settings, progress: Progress) -> Outcome:
     """Means over the subjects, for the paper's light prior and for the default one."""
-    n = settings.subjects(usual=10, quick=4)
+    n = settings.subjects(usual=10, quick=3)
     work = partial(cells, seed=settings.seed)
     found = over_subjects(work, range(1, n + 1), settings, progress)
     each = {name: np.stack([one[name] for one in found]) for name in found[0]}
