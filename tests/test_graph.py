@@ -92,7 +92,7 @@ def test_names_of_places_stand_below_the_axis():
     ],
 )
 def test_ticks_are_round_and_hold_the_ends(low, high, log, ticks):
-    found = graph._ticks(low, high, log)
+    found = np.array(graph._ticks(low, high, log))
     assert len(found) <= 10
     assert found[0] <= low * (1 + 1e-12)
     assert found[-1] >= high * (1 - 1e-12)
