@@ -157,7 +157,7 @@ def shown_literals(tree: ast.Module) -> Iterator[tuple[int, str]]:
 
 
 # Names of things in the program and style rules: small letters without a space
-NOT_WORDS = re.compile(r"[a-z0-9_.:;()=+/\0\[\]\"-]*")
+NOT_WORDS = re.compile(r"[a-z0-9_.:;()=+/?\0\[\]\"-]*")
 
 
 @pytest.mark.parametrize(

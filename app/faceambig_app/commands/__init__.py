@@ -7,7 +7,18 @@ from __future__ import annotations
 
 from types import ModuleType
 
-from . import animate, fit, landmarks, models, modes, posterior, serve, snapshot, sweep
+from . import (
+    animate,
+    fit,
+    landmarks,
+    models,
+    modes,
+    posterior,
+    reproduce,
+    serve,
+    snapshot,
+    sweep,
+)
 
 # The order of the help
 COMMANDS: tuple[tuple[str, ModuleType, str], ...] = (
@@ -19,5 +30,6 @@ COMMANDS: tuple[tuple[str, ModuleType, str], ...] = (
     ("modes", modes, "other faces behind the same points: flexibility, posterior modes, extremes"),
     ("posterior", posterior, "how probable each distance is, and how open the face"),
     ("landmarks", landmarks, "find the points of a face in a photograph"),
+    ("reproduce", reproduce, "the paper's tables and figures, and which of its claims hold"),
     ("models", models, "what a model holds; convert one, install a free one"),
 )
