@@ -83,7 +83,7 @@ def run(settings: Settings, progress: Progress) -> Outcome:
             Chart(
                 f"Modes at {SURFACE_MM:g} mm of mean surface change", "mode", "landmarks, px",
                 (
-                    Line("mean movement of the landmarks", x, tuple(moved.tolist())),
+                    Line("mean movement", x, tuple(moved.tolist())),
                     Line("allowed", x, (LANDMARK_PX,) * len(x)),
                 ),
             ),
@@ -94,6 +94,7 @@ def run(settings: Settings, progress: Progress) -> Outcome:
                     Line("most of a face", x, (high,) * len(x)),
                     Line("least of a face", x, (low,) * len(x)),
                 ),
+                log_y=True,
             ),
         ),
         (),

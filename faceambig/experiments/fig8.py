@@ -207,10 +207,10 @@ def chart(seen: Seen, found: Statistics) -> Chart:
         "the same person", x, tuple(found.same.mean(axis=1).tolist()), tuple(low.tolist()), tuple(high.tolist())
     )  # fmt: skip
     return Chart(
-        f"{seen.name}: a person from {x[0]:.0f} cm and from farther away",
+        f"{seen.name}: a person from {x[0]:.0f} cm and farther away; others from {x[0]:.0f} cm",
         "distance of the second picture in cm",
         "mean landmark distance in %",
-        (own, Line(f"nearest other person, both from {x[0]:.0f} cm", x, flat)),
+        (own, Line("the nearest other", x, flat)),
     )
 
 

@@ -139,7 +139,7 @@ def people_table(near: Array, far: Array, own: Array, pair: Pair) -> Table:
     i, j, _, _ = pair
     rows: list[tuple[Cell, ...]] = [
         (
-            name, 100 * float(near[i, m]), 100 * float(far[j, m]), 100 * float(far[j, m] - near[i, m]),
+            f"{m + 1} {name}", 100 * float(near[i, m]), 100 * float(far[j, m]), 100 * float(far[j, m] - near[i, m]),
             100 * float(far[i, m] - near[i, m]), float(own[:, m].mean()),
         )
         for m, (name, _, _) in enumerate(MEASURES)
@@ -168,7 +168,7 @@ def fitted_table(found: list[Numbers], people: str) -> Table:
     eyes = np.array([one["eyes_mm"] for one in found])
     ratio = 100 * np.abs(other / eyes[:, 1:] - true / eyes[:, :1]).mean(axis=0)
     rows: list[tuple[Cell, ...]] = [
-        (name, float(picture[m]), float(body[m]), float(change[m]), float(ratio[m]))
+        (f"{m + 1} {name}", float(picture[m]), float(body[m]), float(change[m]), float(ratio[m]))
         for m, (name, _, _) in enumerate(MEASURES)
     ]
     rows.append(("mean", float(picture.mean()), None, float(change.mean()), float(ratio.mean())))
@@ -190,14 +190,14 @@ def chart(near: Array, far: Array, own: Array, pair: Pair) -> Chart:
     apart = 100 * np.abs(near[pair.i] - far[pair.j])
     return Chart(
         "Differences of distances in two pictures",
-        "measure",
+        "measure, by its number in the table",
         "% of the distance of the eyes",
         (
             Line("two different people", x, tuple(apart.tolist())),
             Line("the same person, mean of all", x, tuple(own.mean(axis=0).tolist())),
         ),
         bars=True,
-        ticks=tuple(name for name, _, _ in MEASURES),
+        ticks=tuple(str(m + 1) for m in range(len(MEASURES))),
     )
 
 
