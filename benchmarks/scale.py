@@ -2,7 +2,8 @@
 
 A subject is what an experiment does with one: a head drawn from all modes, its photograph from 30 cm, a fit at 120 cm,
 d_L and d_S. The work goes through faceambig.experiments.parallel, as every experiment's does, in one process and in one
-for each core. Wall-clock time; the processes are started before. --most N stops earlier, --model takes another model.
+for each core. Seconds are wall-clock, with the processes started before; beside other programs the CPU time of a
+subject is what can be relied on, and what the outlook is made of. --most N stops earlier, --model takes another model.
 """
 
 from __future__ import annotations
@@ -31,13 +32,14 @@ MOST_ALONE = 1000  # subjects for one process: its rate is known by then
 
 
 def subject(model: fa.FaceModel, number: int) -> dict[str, float]:
-    """d_L and d_S of one head."""
+    """d_L and d_S of one head, and the CPU time they took."""
+    begun = time.thread_time()
     vertices = model.vertices(drawn(model.n_modes, number))
     face = fa.Subject(f"head {number}", "", vertices, None, model)
     photo = fa.observe(face, distance=0.3, scheme=usual_scheme(model))
     fit = fa.fit(model, photo, distance=1.2)
     gap = surface_difference(fit.vertices(), vertices, model.evaluation)
-    return {"d_l": fit.d_l_percent, "d_s": gap.mean_mm}
+    return {"d_l": fit.d_l_percent, "d_s": gap.mean_mm, "cpu": time.thread_time() - begun}
 
 
 def main() -> int:
@@ -50,10 +52,8 @@ def main() -> int:
     model = fa.load_model(options.model)
     counts = [count for count in COUNTS if count <= options.most]
     print("; ".join(f"{name} {value}" for name, value in about().items()))
-    print(
-        f"{'subjects':>9}{'processes':>11}{'seconds':>9}{'a second':>10}{'MB a process':>14}  d_S mean"
-    )
-    rates: dict[int, float] = {}
+    print("subjects  processes  seconds  a second  CPU ms each  MB a process  d_S mean")
+    cpu = 0.0
     means: dict[int, set[str]] = {count: set() for count in counts}
     for jobs in dict.fromkeys((1, cores)):
         settings = Settings(model, options.model, n_jobs=jobs)
@@ -63,17 +63,18 @@ def main() -> int:
             begun = time.perf_counter()
             found = over_subjects(subject, range(1, count + 1), settings, steps.append, chunk=CHUNK)
             seconds = time.perf_counter() - begun
-            rates[jobs] = count / seconds
+            cpu = 1e3 * float(np.mean([one["cpu"] for one in found]))
             mean = f"{np.mean([one['d_s'] for one in found]):.12f}"
             means[count].add(mean)
             memory = steps[-1].worker_bytes / 1e6
-            print(f"{count:>9}{jobs:>11}{seconds:>9.2f}{rates[jobs]:>10.0f}{memory:>14.0f}  {mean}")
+            print(
+                f"{count:>8}{jobs:>11}{seconds:>9.2f}{count / seconds:>10.0f}{cpu:>13.2f}{memory:>14.0f}  {mean}",
+                flush=True,
+            )
     assert all(len(each) == 1 for each in means.values()), "processes change the numbers"
-    per_core = rates[cores] / cores
-    print(f"one process {rates[1]:.0f} a second, {cores} processes {per_core:.0f} a second each")
     for n in sorted({*CORES, cores}):
-        hours = 1e6 / (per_core * n) / 3600
-        print(f"a million on {n} cores like these, if all keep this rate: {hours:.2g} hours")
+        minutes = 1e6 * cpu / 1e3 / n / 60
+        print(f"a million on {n} such cores with nothing else to do: {minutes:.3g} minutes")
     return 0
 
 
