@@ -47,9 +47,8 @@ PEOPLE, QUICK_PEOPLE = 53, 24
 NOISE_PERCENT = 1.0  # sd of each coordinate: a careful annotator
 PAPER_SAME, PAPER_NEAR, PAPER_FAR, PAPER_PAIR = 3.11, 2.86, 2.83, 2.48
 IBUG_EYES = ((36, 39), (42, 45))
-OUTLINE = (
-    0.35  # of the eyes' distance: a point of the mean face nearer to its hull is one of the contour
-)
+# Of the eyes' distance: a point of the mean face nearer to its hull is one of the contour
+OUTLINE = 0.25
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -5,7 +5,7 @@
     fids_Rcpr300F_OR (n, 136, D)   68 points of a detector, in the order of Multi-PIE, which is that of iBUG
 
 Pixels count from 1 there, as in MATLAB, and from the upper left corner of the first pixel here. The published archive
-has 51 people, its paper 53 (docs/models.md); the number is the file's. The pictures themselves are not needed.
+has 51 people, its paper 53; the number is the file's. The pictures themselves are not needed.
 """
 
 from __future__ import annotations
