@@ -35,10 +35,10 @@ NOISE_PERCENT = (0.0, 1.0)
 def run(settings: Settings, progress: Progress) -> Outcome:
     """Both pictures of everyone, with and without noise; nearest others among the first n."""
     model = settings.model
-    most = settings.subjects(NUMBERS[-1], QUICK[-1])
-    numbers = tuple(n for n in (QUICK if settings.quick else NUMBERS) if n <= most)
+    most = max(4, settings.subjects(NUMBERS[-1], QUICK[-1]))
+    numbers = (*(n for n in (QUICK if settings.quick else NUMBERS) if n < most), most)
     if len(numbers) < 2:
-        raise ValueError(f"subjects: {most} people; give at least {NUMBERS[1]}")
+        numbers = (most // 2, most)
     scheme, points = point_sets(model)[0]
     at = surface_points(model, scheme, random_people(model, numbers[-1], settings.seed))
     rows, lines = [], []
