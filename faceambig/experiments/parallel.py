@@ -7,6 +7,7 @@ name made of all that decides its numbers: the code, the model, the function and
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import os
 import zipfile
@@ -14,7 +15,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from functools import lru_cache, partial
 from importlib import import_module
-from itertools import islice
+from itertools import count, islice
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -32,8 +33,10 @@ Work = Callable[[FaceModel, Item], Mapping[str, ArrayLike]]
 Chunk = list[Numbers]
 
 RAY_AT_ONCE = 64  # chunks
+COPIES = 8  # of the model that a worker lets pile up
 
 _MODELS: dict[str, FaceModel] = {}  # of a worker: a model that came before is not kept twice
+_SPARE_COPIES = count()
 
 
 def over_subjects(
@@ -85,12 +88,12 @@ def _run(
         return
     if settings.n_jobs == 1 and settings.backend == "loky":
         for k, part in jobs:
-            yield _chunk(k, part, function, model, digest)
+            yield _chunk(k, part, function, model)
         return
     joblib = _imported("joblib", "batch")
     with ExitStack() as stack:
         stack.enter_context(_backend(joblib, settings, stack))
-        work = joblib.delayed(_chunk)
+        work = joblib.delayed(_chunk_of_worker)
         calls = (work(k, part, function, model, digest) for k, part in jobs)
         if settings.backend != "ray":
             parallel = joblib.Parallel(n_jobs=settings.n_jobs, return_as="generator_unordered")
@@ -142,12 +145,22 @@ def _imported(name: str, extra: str) -> Any:
         raise ValueError(f"backend: {name} is not installed; pip install {package}") from error
 
 
-def _chunk(
+def _chunk_of_worker(
     k: int, items: list[Item], function: Work[Item], model: FaceModel, digest: str
 ) -> tuple[int, Chunk, int]:
-    """What a worker does."""
-    # A task brings its own copy of the model; what is kept by model, as rows of landmarks, needs always the same one
-    model = _MODELS.setdefault(digest, model)
+    """As `_chunk`, of a model that came with the task."""
+    # What is kept by model, as rows of landmarks, needs always the same one
+    kept = _MODELS.setdefault(digest, model)
+    # Model and subjects hold each other: the copies stay until they are looked for, which costs 20 ms
+    if kept is not model and next(_SPARE_COPIES) % COPIES == COPIES - 1:
+        gc.collect()
+    return _chunk(k, items, function, kept)
+
+
+def _chunk(
+    k: int, items: list[Item], function: Work[Item], model: FaceModel
+) -> tuple[int, Chunk, int]:
+    """The numbers of some items, on one BLAS thread."""
     with _threads().limit(limits=1):
         part = [
             {name: np.asarray(value) for name, value in function(model, item).items()}
