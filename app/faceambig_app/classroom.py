@@ -212,7 +212,7 @@ class Seat:
             if asked is not None:
                 bars = bars_html(asked[1], room.answers(asked[0]), present)
         else:
-            words = say(f"class.{self._place_words()}")
+            words = self._words()
         self._show(
             Shown(
                 html=f'<div class="fa" role="status"><p class="fa-small">{escape(words)}</p></div>' + bars,
@@ -222,13 +222,14 @@ class Seat:
             )
         )  # fmt: skip
 
-    def _place_words(self) -> str:
+    def _words(self) -> str:
+        """What this browser is, if it does not lead."""
         room = self._room
         if room.leader is None:
-            return "gone" if room.state is not None else "waits"
+            return say("class.waits") if room.state is None else say("class.gone")
         if not self.following:
-            return "alone"
-        return "private" if room.private else "follows"
+            return say("class.alone")
+        return say("class.private") if room.private else say("class.follows")
 
 
 def for_eyes_of(state: ViewState, reader: ViewState) -> ViewState:

@@ -68,7 +68,7 @@ class Display:
 
     def _draw_own(self, own: OwnPhoto | None, state: ViewState, draft: bool) -> Rest | None:
         shown = own_frame(own, state, draft)
-        self._send(self._own_contents(own, state, shown, draft), shown.scene, draft)
+        self._send(self._own_contents(own, state, shown, draft), whole(shown.scene), draft)
         if draft:
             return None
         return Rest(shown.sliders, told_distance(own, state), shown.scene.numbers)
@@ -87,8 +87,6 @@ class Display:
     def _send(self, html: Contents, scene: Scene | None = None, draft: bool = False) -> None:
         if self._gone():  # while this was computed
             return
-        if scene is not None:
-            whole(scene)
         with self._client.atomic():
             if scene is not None:
                 self._stage.show(scene, draft)

@@ -14,6 +14,7 @@ from typing import TypeVar
 
 from . import figures, photograph, pipeline, plots
 from .pipeline import Frame, frame, plots_of
+from .scenes import whole
 from .state import DEFAULT, ViewState, changed
 from .told import Slider, flex_lines, pins_of, sliders_of, spectrum_of, told
 
@@ -26,7 +27,7 @@ class Drawn:
     """One state, at rest or as a draft: its frame, and its words and plots as HTML."""
 
     def __init__(self, state: ViewState, shown: Frame, draft: bool) -> None:
-        self.state, self.frame, self.scene = state, shown, shown.scene
+        self.state, self.frame, self.scene = state, shown, whole(shown.scene)
         self._draft = draft
 
     @cached_property
