@@ -81,6 +81,7 @@ class Browser:
         self._probing = False  # whether the page may ask what is under the pointer
         self._probed = ""  # what it was answered
         self._settled: ViewState | None = None  # the state drawn in full last
+        self._greeted = False  # whether the page's script has told its address
         self._owned = False  # whether there is a photograph of this person
         self.stage = Stage(client, self._orbited)
         self._dress()
@@ -124,7 +125,13 @@ class Browser:
 
     def open(self) -> None:
         """Draw the first frame: of the state in the address, or of the default where no script tells."""
-        self._loop.call_later(HELLO, self.room.open)
+        self._loop.call_later(HELLO, self._unheard)
+
+    def _unheard(self) -> None:
+        """Begin, with or without a word of the page's script."""
+        if not self._greeted and not self.room.left:
+            self._begin(self.room.state)
+        self.room.open()
 
     def leave(self) -> None:
         """The browser has gone: compute nothing more for it."""
@@ -303,14 +310,22 @@ class Browser:
             state = changed(state, text=hello.text)
         for words in notices:
             self.notice(words)
-        state = self._lessons.arrived(state)
-        if self._seat is None:
-            self._travel(history.History(state))
-        else:
-            if self._seat.may_lead and hello.text is None and state.text == DEFAULT.text:
-                state = changed(state, text=FOR_ALL)
-            self._travel(history.History(self._seat.arrive(state)), own=self._seat.leads)
+        if (
+            self._seat is not None
+            and self._seat.may_lead
+            and hello.text is None
+            and state.text == DEFAULT.text
+        ):
+            state = changed(state, text=FOR_ALL)
+        self._greeted = True
+        self._begin(self._lessons.arrived(state))
         self.room.open()
+
+    def _begin(self, state: ViewState) -> None:
+        """Be at a state without a past; in a class where the class is."""
+        seat = self._seat
+        arrived = state if seat is None else seat.arrive(state)
+        self._travel(history.History(arrived), own=seat is not None and seat.leads)
 
     def _dress(self) -> None:
         """Light or dark, as the state or the system says."""
