@@ -12,10 +12,10 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
+import http.client
 import time
-import urllib.error
-import urllib.request
 from collections.abc import Sequence
+from urllib.parse import urlsplit
 
 import numpy as np
 from page_load import HEAD, PATIENCE, QUIET, SLIDER
@@ -26,19 +26,14 @@ PROMISED = 0.3  # seconds, p95
 DRAG_VALUES, HERTZ = 40, 20.0
 
 
-class _Stay(urllib.request.HTTPRedirectHandler):
-    def redirect_request(self, *_args: object) -> None:
-        return None
-
-
 def cookie_of(link: str) -> str:
     """What a browser gets from the leader's link."""
-    try:
-        urllib.request.build_opener(_Stay).open(link)
-    except urllib.error.HTTPError as answer:
-        cookies = answer.headers.get_all("Set-Cookie") or []
-        return "; ".join(cookie.partition(";")[0] for cookie in cookies)
-    raise RuntimeError(f"{link} leads nowhere")
+    parts = urlsplit(link)
+    connection = http.client.HTTPConnection(parts.netloc, timeout=PATIENCE)
+    connection.request("GET", f"/?{parts.query}")
+    cookies = connection.getresponse().headers.get_all("Set-Cookie") or []
+    connection.close()
+    return "; ".join(cookie.partition(";")[0] for cookie in cookies)
 
 
 async def step(leader: Tab, followers: Sequence[Tab], value: int) -> np.ndarray:
@@ -122,7 +117,7 @@ async def run(server: Server, link: str, count: int, steps: int) -> None:
 
 def main() -> None:
     """Print the figures."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--followers", type=int, default=30)
     parser.add_argument("--steps", type=int, default=25)
     options = parser.parse_args()
