@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 import logging
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from html import escape
 
 from .history import OF_THE_READER
@@ -26,7 +27,8 @@ BINS = 5  # bars of a question that asks for a number
 class Classroom:
     """What all browsers of a class share."""
 
-    def __init__(self, lessons: Lessons) -> None:
+    def __init__(self, lessons: Callable[[], Lessons]) -> None:
+        """lessons: asked for at every use, as their words are of whoever is spoken to."""
         self.state: ViewState | None = None  # of who leads, or led last; None: nobody has
         self.revealed: set[Place] = set()
         self.private = (
@@ -87,7 +89,7 @@ class Classroom:
 
     def question(self, state: ViewState) -> tuple[Place, Ask] | None:
         """What a state asks, and where; None if nothing."""
-        lesson = self._lessons.by_number.get(state.lesson or 0)
+        lesson = self._lessons().by_number.get(state.lesson or 0)
         if lesson is None:
             return None
         step = min(state.step, len(lesson.steps))
@@ -119,10 +121,13 @@ class Seat:
         reveal: Callable[[Place], None],
         show: Callable[[Shown], None],
         now: Callable[[], ViewState],
+        speaking: Callable[[], AbstractContextManager[object]] = nullcontext,
     ) -> None:
+        """speaking: within it words are this browser's, whoever it was that changed something."""
         self.may_lead = may_lead
         self.following = not may_lead
         self._room, self._go, self._show, self._now = room, go, show, now
+        self._speaking = speaking
         self.reveal = reveal
 
     @property
@@ -202,6 +207,10 @@ class Seat:
 
     def show(self) -> None:
         """Show what this browser is in the class."""
+        with self._speaking():
+            self._tell()
+
+    def _tell(self) -> None:
         room, bars, hidden = self._room, "", False
         if self.leads:
             present, following = room.counts

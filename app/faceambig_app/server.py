@@ -70,7 +70,7 @@ class Page:
             hooks=hooks,
         )
         self._token, self._lead, self._allowed = token, lead, allowed
-        self._class = None if lead is None else Classroom(lessons())
+        self._class = None if lead is None else Classroom(lessons)
         self._invitation = ""
         if self._class is not None:
             room = self.links[0]

@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -250,7 +251,7 @@ class Chair:
 
 
 def test_a_photograph_of_the_leaders_own_goes_nowhere():
-    room = Classroom(lessons())
+    room = Classroom(lessons)
     leader, other = Chair(room, may_lead=True), Chair(room)
     leader.move(subject=3)
     leader.move(subject="photo", distance=0.5)
@@ -262,8 +263,28 @@ def test_a_photograph_of_the_leaders_own_goes_nowhere():
     assert say("class.follows") in other.shown.html
 
 
+def test_each_is_spoken_to_in_its_own_way():
+    spoken: list[str] = []
+
+    @contextmanager
+    def speaking() -> Iterator[None]:
+        spoken.append("begins")
+        yield
+        spoken.append("ends")
+
+    room = Classroom(lessons)
+    seat = Seat(
+        room, may_lead=False, go=lambda _: None, reveal=lambda _: None, now=lambda: DEFAULT,
+        show=lambda _: spoken.append("says"), speaking=speaking,
+    )  # fmt: skip
+    seat.arrive(DEFAULT)
+    spoken.clear()
+    Chair(room, may_lead=True)  # somebody else comes, and the first is told
+    assert spoken[:3] == ["begins", "says", "ends"]
+
+
 def test_one_that_fails_holds_up_nobody(monkeypatch, caplog):
-    room = Classroom(lessons())
+    room = Classroom(lessons)
     leader, broken, other = Chair(room, may_lead=True), Chair(room), Chair(room)
     monkeypatch.setattr(broken.seat, "follow", lambda _: 1 // 0)
     leader.move(distance=0.5)
@@ -272,7 +293,7 @@ def test_one_that_fails_holds_up_nobody(monkeypatch, caplog):
 
 
 def test_who_does_not_lead_reveals_nothing():
-    room = Classroom(lessons())
+    room = Classroom(lessons)
     leader, other = Chair(room, may_lead=True), Chair(room)
     leader.state = STEP.state
     leader.seat.moved(DEFAULT, STEP.state)
