@@ -20,7 +20,7 @@ FOCUSED = """() => { const e = document.activeElement; if (e === document.body |
     getComputedStyle(e).outlineStyle === 'solid' && above !== null && (e.contains(above) || above.contains(e))] }"""
 # What a person can do on a tab, but for the tabs themselves
 CONTROLS = """() => [...document.querySelectorAll('[role=slider], input:not([type=hidden], [type=file]), summary, ' +
-    'button:not([aria-hidden=true]), [role=button]')]
+    'button:not([aria-hidden=true], [role=tab]), [role=button]')]
   .filter(e => e.checkVisibility() && e.getBoundingClientRect().width && !e.closest('.mantine-Notification-root'))
   .map(e => e.ariaLabel || e.labels?.[0]?.textContent || e.textContent.trim())"""
 SIDEWAYS = """() => [...document.querySelectorAll('.mantine-ScrollArea-viewport')]

@@ -140,6 +140,7 @@ def test_the_skin_is_not_asked_and_a_press_that_turns_the_heads_is_no_click(me):
 
 def test_a_finger_reads_by_a_tap(visit, tmp_path):
     you = visit(390, 844, query="show=difference&view=front", dpr=1, has_touch=True)
+    you.close_notices()
     vertex, mm = vertex_of(you, "fit")
     x, y = you.tab.evaluate(AT, ["/fit/head", vertex])
     you.tab.touchscreen.tap(x, y)
