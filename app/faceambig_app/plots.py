@@ -37,8 +37,8 @@ def plots(
 ) -> str:
     """The curves against the assumed distance, the range that cannot be told apart in words, and a table.
 
-    `hide` of Scene: "numbers" leaves out curves, words and table, "truth" the curve of d_S, "actual" the line of the true
-    distance. brief: without the table, for while a hand moves.
+    `hide` of Scene: "numbers" leaves out curves, words and table, "truth" the curve of d_S, "actual" the line of the
+    true distance. brief: without the table, for while a hand moves.
     """
     told = "numbers" not in hide
     true = told and "truth" not in hide
@@ -52,7 +52,8 @@ def plots(
     marks = _marks(x, numbers, top, true) if told else ""
     said = _said(curves, true, not brief) if told else ""
     return (
-        f'<div class="fa"><div class="fa-wide"><svg class="fa-plot" viewBox="0 0 {WIDTH} {_ticks_at(curves, told) + 40}" '
+        f'<div class="fa"><div class="fa-wide">'
+        f'<svg class="fa-plot" viewBox="0 0 {WIDTH} {_ticks_at(curves, told) + 40}" '
         f'role="img" aria-label="{words}">{below}{cursor}{above}{marks}</svg></div>{said}</div>'
     )
 
