@@ -22,7 +22,7 @@ demo: for-demo .venv/.app
 	.venv/bin/faceambig serve --port $(PORT)
 
 test: for-test .venv/.dev
-	.venv/bin/python -m pytest -n 2 $(TESTS)
+	.venv/bin/python -m pytest -n 2 --dist worksteal $(TESTS)
 
 check: .venv/.dev
 	.venv/bin/ruff check
