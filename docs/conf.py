@@ -7,7 +7,11 @@ import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT), str(ROOT / "app"), str(ROOT / "docs" / "_ext")]  # of this checkout, whatever is installed
+sys.path[:0] = [
+    str(ROOT),
+    str(ROOT / "app"),
+    str(ROOT / "docs" / "_ext"),
+]  # of this checkout, whatever is installed
 
 project = "faceambig"
 author = "The faceambig developers"

@@ -49,7 +49,9 @@ def converted(lines: list[str]) -> list[str]:
             number += 1
         elif line.startswith("    ") and (not done or not done[-1].strip()):
             block = []
-            while number < len(lines) and (lines[number].startswith("    ") or not lines[number].strip()):
+            while number < len(lines) and (
+                lines[number].startswith("    ") or not lines[number].strip()
+            ):
                 block.append(lines[number])
                 number += 1
             done += ["::", "", *block, ""]
@@ -85,5 +87,8 @@ def fields(kind: type) -> list[str]:
             last = rows[(node.end_lineno or node.lineno) - 1][node.end_col_offset or 0 :]
             comment = last.partition("#")[2].strip()
             kind_words = " ".join(ast.unparse(node.annotation).split())
-            told.append(f"* ``{node.target.id}: {kind_words}``" + (f" -- {marked(comment)}" if comment else ""))
+            told.append(
+                f"* ``{node.target.id}: {kind_words}``"
+                + (f" -- {marked(comment)}" if comment else "")
+            )
     return ["", ".. rubric:: Fields", "", *told, ""] if told else []

@@ -10,7 +10,9 @@ from docutils.utils.math.latex2mathml import tex2mathml
 
 def setup(app: Any) -> dict[str, bool]:
     """The renderer that conf.py names."""
-    app.add_html_math_renderer("mathml", inline_renderers=(_inline, None), block_renderers=(_block, None))
+    app.add_html_math_renderer(
+        "mathml", inline_renderers=(_inline, None), block_renderers=(_block, None)
+    )
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
 
