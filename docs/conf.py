@@ -30,7 +30,6 @@ myst_heading_anchors = 3
 html_math_renderer = "mathml"  # _ext/formulas.py
 
 autodoc_typehints = "signature"
-autodoc_typehints_format = "short"
 python_maximum_signature_line_length = 90
 nitpicky = True
 # Types of other packages, and of ours that are not public: named, with no page to lead to

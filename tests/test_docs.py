@@ -1,4 +1,4 @@
-"""The documentation says what is so: its sessions print what they show, its command page is the parsers', its links hold."""
+"""The documentation says what is so: sessions print what they show, flags are the parsers', links lead somewhere."""
 
 from __future__ import annotations
 

@@ -20,10 +20,12 @@ from faceambig_app.commands.shared import BAD_INPUT, GOOD, NOT_CONVERGED, READER
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "commands.md"
 HEAD = f"""# Commands
 
-Written by `python tools/command_reference.py` from the same parsers that print `faceambig COMMAND --help`; a test compares them.
+Written by `python tools/command_reference.py` from the same parsers that print `faceambig COMMAND --help`; a test
+compares them.
 
-Flags are given in full. The exit status is {GOOD} if all is good, {NOT_CONVERGED} if a fit did not converge or a part of the work
-could not be done, {BAD_INPUT} with one line on stderr if the input is bad, 130 if interrupted, {READER_GONE} if what reads the output has gone.
+Flags are given in full. The exit status is {GOOD} if all is good, {NOT_CONVERGED} if a fit did not converge or a part
+of the work could not be done, {BAD_INPUT} with one line on stderr if the input is bad, 130 if interrupted,
+{READER_GONE} if what reads the output has gone.
 
 | command | |
 |---|---|
@@ -58,13 +60,10 @@ def usage(name: str, command: argparse.ArgumentParser) -> Iterator[str]:
     if command.usage:
         yield from (line.strip() for line in command.usage.splitlines())
         return
-    parts = ["faceambig", name]
-    for action in command._actions:
-        if action.required and action.option_strings:
-            parts.append(f"{action.option_strings[-1]} {shown(command, action)}")
-    parts.append("[flags]")
-    parts += [shown(command, a) for a in command._actions if not a.option_strings]
-    yield " ".join(parts)
+    needed = [a for a in command._actions if a.required and a.option_strings]
+    flags = [f"{action.option_strings[-1]} {shown(command, action)}" for action in needed]
+    words = [shown(command, action) for action in command._actions if not action.option_strings]
+    yield " ".join(["faceambig", name, *flags, "[flags]", *words])
 
 
 def shown(command: argparse.ArgumentParser, action: argparse.Action) -> str:

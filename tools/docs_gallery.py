@@ -24,9 +24,10 @@ DOCS = Path(__file__).resolve().parents[1] / "docs"
 QUALITY = 90
 HEAD = """# Gallery
 
-Each table and figure of the paper on the embedded head: the pictures that `faceambig reproduce all` writes, with each claim of the paper, its number, ours, and whether it
-holds. That one does not hold here is a result: [how to read them, and what stands in for what](experiments.md). Larger pictures of the ambiguity itself are in [what a
-photograph leaves open](ambiguity.md). Written by `python tools/docs_gallery.py` from a report.
+Each table and figure of the paper on the embedded head: the pictures that `faceambig reproduce all` writes, with
+each claim of the paper, its number, ours, and whether it holds. That one does not hold here is a result:
+[how to read them, and what stands in for what](experiments.md). Larger pictures of the ambiguity itself are in
+[what a photograph leaves open](ambiguity.md). Written by `python tools/docs_gallery.py` from a report.
 """
 
 

@@ -19,6 +19,7 @@ ENTRY = re.compile(r"(\*{0,2}[A-Za-z_][\w ,.]*?): +(.*)")
 def setup(app: Any) -> dict[str, bool]:
     """Converts what autodoc has read."""
     app.connect("autodoc-process-docstring", _process)
+    app.connect("autodoc-process-signature", _signature)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
 
@@ -27,6 +28,19 @@ def _process(_app: Any, what: str, _name: str, thing: Any, _options: Any, lines:
     if what in ("class", "exception") and is_dataclass(thing):
         text += fields(thing)
     lines[:] = text
+
+
+def _signature(
+    _app: Any, _what: str, _name: str, thing: Any, _options: Any, signature: str | None, returned: str | None
+) -> tuple[str | None, str | None]:  # fmt: skip
+    """As it is written in the source, `Array` and not what it stands for; none where a list of fields says it all."""
+    if inspect.isclass(thing):
+        return "", None
+    if not inspect.isroutine(thing):
+        return signature, returned
+    found = inspect.signature(thing)
+    words = str(found.replace(return_annotation=found.empty))
+    return re.sub(r": '([^']*)'", r": \1", words), found.return_annotation
 
 
 def converted(lines: list[str]) -> list[str]:
