@@ -30,17 +30,32 @@ def _process(_app: Any, what: str, _name: str, thing: Any, _options: Any, lines:
     lines[:] = text
 
 
+class Written:
+    """An annotation as it stands in the source."""
+
+    def __init__(self, words: str) -> None:
+        self.words = words
+
+    def __repr__(self) -> str:
+        return self.words
+
+
 def _signature(
-    _app: Any, _what: str, _name: str, thing: Any, _options: Any, signature: str | None, returned: str | None
-) -> tuple[str | None, str | None]:  # fmt: skip
-    """As it is written in the source, `Array` and not what it stands for; none where a list of fields says it all."""
-    if inspect.isclass(thing):
+    _app: Any, what: str, _name: str, thing: Any, _options: Any, _signature: str | None, _returned: str | None
+) -> tuple[str, str | None] | None:  # fmt: skip
+    """`Array` and not what it stands for; nothing where a list of fields says it all."""
+    if what == "class":
         return "", None
     if not inspect.isroutine(thing):
-        return signature, returned
+        return None  # as it is
     found = inspect.signature(thing)
-    words = str(found.replace(return_annotation=found.empty))
-    return re.sub(r": '([^']*)'", r": \1", words), found.return_annotation
+    parameters = [
+        one if one.annotation is one.empty else one.replace(annotation=Written(one.annotation))
+        for one in found.parameters.values()
+        if one.name != "self"
+    ]
+    words = str(found.replace(parameters=parameters, return_annotation=found.empty))
+    return words, None if found.return_annotation is found.empty else found.return_annotation
 
 
 def converted(lines: list[str]) -> list[str]:
