@@ -23,9 +23,9 @@ HEAD = f"""# Commands
 Written by `python tools/command_reference.py` from the same parsers that print `faceambig COMMAND --help`; a test
 compares them.
 
-Flags are given in full. The exit status is {GOOD} if all is good, {NOT_CONVERGED} if a fit did not converge or a part
-of the work could not be done, {BAD_INPUT} with one line on stderr if the input is bad, 130 if interrupted,
-{READER_GONE} if what reads the output has gone.
+Flags are given in full; `faceambig --version` prints the version. The exit status is {GOOD} if all is good,
+{NOT_CONVERGED} if a fit did not converge or a part of the work could not be done, {BAD_INPUT} with one line on stderr
+if the input is bad, 130 if interrupted, {READER_GONE} if what reads the output has gone.
 
 | command | |
 |---|---|
