@@ -146,13 +146,14 @@ def held(page: Any) -> dict[str, int]:
 
 def main() -> None:
     """Serve until the input ends."""
-    from faceambig_app import server
+    from faceambig_app import guard, server
 
     stages = Stages()
     if "--stages" in sys.argv[1:]:
         stages.install()
-    page = server.Page("127.0.0.1", 0)
-    print(page.address, flush=True)
+    present = "--present" in sys.argv[1:]
+    page = server.Page("127.0.0.1", 0, lead=guard.make_token() if present else None)
+    print(page.address, page.leader_link or "", flush=True)
     for line in sys.stdin:
         told = stages.told() if line.strip() == "stages" else held(page)
         print(json.dumps(told), flush=True)
@@ -164,7 +165,8 @@ class Server:
 
     def __init__(self, process: subprocess.Popen[str]) -> None:
         self._process = process
-        self.address = self._line().strip()
+        self.address, _, leader = self._line().strip().partition(" ")
+        self.leader = leader or None  # link of who leads
 
     def ask(self, what: str) -> dict[str, Any]:
         """Its answer to "stages" or "state"."""
@@ -188,9 +190,13 @@ class Server:
 
 
 @contextlib.contextmanager
-def running(*, stages: bool = False) -> Iterator[Server]:
-    """The page on a free port, ended afterwards. The timers of `stages` cost some microseconds a call."""
-    command = [sys.executable, __file__, *(["--stages"] if stages else [])]
+def running(*, stages: bool = False, present: bool = False) -> Iterator[Server]:
+    """The page on a free port, ended afterwards; `present`: of a class.
+
+    The timers of `stages` cost some microseconds a call.
+    """
+    flags = ["--stages"] * stages + ["--present"] * present
+    command = [sys.executable, __file__, *flags]
     with subprocess.Popen(  # noqa: S603 - this file
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as process:

@@ -176,11 +176,12 @@ def _kind(message: dict[str, Any], props: dict[str, Any]) -> str:
 
 
 @contextlib.asynccontextmanager
-async def opened(address: str, first: str = "/fit", patience: float = 60.0):
+async def opened(address: str, first: str = "/fit", patience: float = 60.0, cookie: str = ""):
     """A tab that has its controls and the first meshes below the node `first`."""
     async with connect(
         address.replace("http", "ws", 1), subprotocols=[Subprotocol(VISER)], origin=Origin(address.rstrip("/")),
         compression=None, max_size=None, ping_interval=None, proxy=None, open_timeout=patience,
+        additional_headers={"Cookie": cookie} if cookie else None,
     ) as socket:  # fmt: skip
         tab = Tab(socket)
         listener = asyncio.create_task(tab.listen())

@@ -28,7 +28,7 @@ DATA = re.compile(r'<div hidden data-faceambig="(\w+)" data-json="([^"]*)"></div
 class Wire:
     """One connection to the page at 127.0.0.1. Nothing is read but in `read` and in what waits."""
 
-    def __init__(self, port: int, query: str = "") -> None:
+    def __init__(self, port: int, query: str = "", cookie: str = "") -> None:
         self._query = query
         self.controls: dict[str, dict[str, Any]] = {}  # by uuid: the message that made it
         self.values: dict[str, Any] = {}  # by uuid, as this browser would show them
@@ -44,6 +44,7 @@ class Wire:
             subprotocols=[Subprotocol("viser-v1.1.1")],
             origin=f"http://127.0.0.1:{port}",  # pyright: ignore[reportArgumentType] - a plain str to websockets
             compression=None,
+            additional_headers={"Cookie": cookie} if cookie else None,
             proxy=None,
             max_size=None,
             ping_interval=None,  # a browser sends none
@@ -98,6 +99,11 @@ class Wire:
     def rests(self, seconds: float) -> bool:
         """Wait for the first full frame: then the page's address is told."""
         return self.wait(lambda: "address" in self.told, seconds)
+
+    @property
+    def shown(self) -> str:
+        """All that the elements of the page show now, as HTML."""
+        return "".join(self._html.values())
 
     @property
     def query(self) -> str | None:

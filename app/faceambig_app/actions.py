@@ -187,6 +187,7 @@ _ROWS = (
     Action("lesson_next", "N"),
     Action("lesson_back"),
     Action("lesson_leave"),
+    Action("reveal", "V"),
     Action("copy_link"),
     Action("copy_command"),
     Action("far_away", change=_set(camera="orthographic")),

@@ -8,12 +8,14 @@ from __future__ import annotations
 import logging
 import time
 from asyncio import AbstractEventLoop
+from dataclasses import replace
 from typing import cast
 
 import viser
 
 from . import figures, guard, history, own_page, under
 from .actions import ACTIONS
+from .classroom import Classroom, Seat
 from .display import Display, Rest
 from .fields import FIELDS
 from .fits import model
@@ -26,6 +28,7 @@ from .notices import cause, from_query
 from .orders import Orders
 from .own_room import OwnRoom
 from .panel import Change, Panel
+from .panel.classroom import Shown
 from .panel.widgets import setting
 from .room import REST, Dispatcher, Room
 from .saving import Saving
@@ -51,6 +54,7 @@ from .text import say
 
 log = logging.getLogger("faceambig")
 
+FOR_ALL = 1.5  # size of letters of a page that a class looks at
 HELLO = 0.5  # seconds to wait for the page's script to say which state the address asks for
 
 
@@ -63,6 +67,10 @@ class Browser:
         dispatcher: Dispatcher,
         orders: Orders,
         loop: AbstractEventLoop,
+        classroom: Classroom | None = None,
+        *,
+        leads: bool = False,
+        invitation: str = "",
     ) -> None:
         self._client, self._loop = client, loop
         self.room = Room(DEFAULT, self, dispatcher.ring)
@@ -73,6 +81,7 @@ class Browser:
         self._probing = False  # whether the page may ask what is under the pointer
         self._probed = ""  # what it was answered
         self._settled: ViewState | None = None  # the state drawn in full last
+        self._greeted = False  # whether the page's script has told its address
         self._owned = False  # whether there is a photograph of this person
         self.stage = Stage(client, self._orbited)
         self._dress()
@@ -93,14 +102,18 @@ class Browser:
             show=lambda shown: self.panel.export.show(shown), notice=self.notice,
             own=lambda: self._own.photo,
         )  # fmt: skip
+        self._seat = None if classroom is None else Seat(
+            classroom, may_lead=leads, go=self._followed, now=lambda: self.room.state,
+            reveal=lambda place: self._lessons.reveal(place), show=self._show_class,
+        )  # fmt: skip
         self._lessons = LessonRoom(
             lessons(), now=lambda: self.room.state, tell=self.change, notice=self._remark,
-            show=lambda shown: self.panel.lesson.show(shown),
+            show=lambda shown: self.panel.lesson.show(shown), of=self._seat,
         )  # fmt: skip
         self.panel = Panel(
             client.gui, people, self.change, self.act, narrow=self.stage.narrow,
             own=self._own, use_hint=self._use_hint, saving=self._saving,
-            lessons_do=self._lessons,
+            lessons_do=self._lessons, class_do=self._seat, invitation=invitation,
         )  # fmt: skip
         self._display = Display(client, self.stage, self.panel, gone=lambda: self.room.left)
         style = STYLE + figures.hidden_boxes(self.panel.widgets.step_sliders)
@@ -112,11 +125,19 @@ class Browser:
 
     def open(self) -> None:
         """Draw the first frame: of the state in the address, or of the default where no script tells."""
-        self._loop.call_later(HELLO, self.room.open)
+        self._loop.call_later(HELLO, self._unheard)
+
+    def _unheard(self) -> None:
+        """Begin, with or without a word of the page's script."""
+        if not self._greeted and not self.room.left:
+            self._begin(self.room.state)
+        self.room.open()
 
     def leave(self) -> None:
         """The browser has gone: compute nothing more for it."""
         self.room.left = True
+        if self._seat is not None:
+            self._seat.leave()
         self._own.leave()
         self._saving.leave()
         self._glide.stop()
@@ -157,6 +178,8 @@ class Browser:
                 self.change(self._lessons.back)
             case "lesson_leave":
                 self.change(self._lessons.leave)
+            case "reveal" if self._seat is not None:
+                self.change(self._seat.unhide)
             case "copy_link":
                 self.script.copy_link(query(self.room.state))
             case "copy_command":
@@ -170,8 +193,11 @@ class Browser:
             )  # a drawn face has a distance of its own: the fit moves
         self._travel(history.change(self._history, state, time.monotonic()))
 
-    def _travel(self, to: history.History) -> None:
-        """Be where a history says, and show it: widgets at once, heads and numbers when a worker is free."""
+    def _travel(self, to: history.History, *, own: bool = True) -> None:
+        """Be where a history says, and show it: widgets at once, heads and numbers when a worker is free.
+
+        own: whether this person has gone there, and not the class.
+        """
         before, self._history = self.room.state, to
         self.room.go(to.now)
         self._read(before, to.now)
@@ -180,6 +206,20 @@ class Browser:
             self.script.theme(cast(Theme, to.now.theme), to.now.text)
         self.panel.show(to.now)
         self._lessons.watch(to.now)
+        if own and self._seat is not None:
+            self._seat.moved(before, to.now)
+
+    def _followed(self, state: ViewState) -> None:
+        """The class is at a state, and so is this browser: no step of its history, what was undone is gone."""
+        self._glide.stop()
+        self._travel(
+            replace(self._history, now=state, future=(), changed_at=None),
+            own=False,
+        )
+
+    def _show_class(self, shown: Shown) -> None:
+        if self.panel.classroom is not None:
+            self.panel.classroom.show(shown)
 
     def _opened(self, state: ViewState) -> None:
         """A state came in a file."""
@@ -270,8 +310,22 @@ class Browser:
             state = changed(state, text=hello.text)
         for words in notices:
             self.notice(words)
-        self._travel(history.History(self._lessons.arrived(state)))
+        if (
+            self._seat is not None
+            and self._seat.may_lead
+            and hello.text is None
+            and state.text == DEFAULT.text
+        ):
+            state = changed(state, text=FOR_ALL)
+        self._greeted = True
+        self._begin(self._lessons.arrived(state))
         self.room.open()
+
+    def _begin(self, state: ViewState) -> None:
+        """Be at a state without a past; in a class where the class is."""
+        seat = self._seat
+        arrived = state if seat is None else seat.arrive(state)
+        self._travel(history.History(arrived), own=seat is not None and seat.leads)
 
     def _dress(self) -> None:
         """Light or dark, as the state or the system says."""
@@ -285,6 +339,8 @@ class Browser:
 
     def _command_palette(self) -> None:
         for action in ACTIONS.values():
+            if action.name == "reveal" and (self._seat is None or not self._seat.may_lead):
+                continue
             entry = self._client.gui.add_command(
                 say(f"action.{action.name}"),
                 description=say(f"action.{action.name}_hint"),

@@ -12,16 +12,16 @@ import viser
 
 from faceambig.scene import Numbers, Scene
 
-from . import figures, own_page, photograph, pipeline, plots
+from . import figures, own_page, photograph
+from .drawn import Drawn, drawn
 from .faces import curve_key
 from .own import OwnFrame, OwnPhoto, own_frame, told_distance
 from .panel import Panel
-from .pipeline import Frame, frame, plots_of
 from .scenes import photo_jpeg, whole
 from .stage import Stage
 from .state import ViewState
 from .style import text_size
-from .told import Slider, flex_lines, pins_of, sliders_of, spectrum_of, told
+from .told import Slider
 
 Contents = list[tuple[viser.GuiHtmlHandle, str]]
 
@@ -55,23 +55,20 @@ class Display:
         """
         if state.subject == "photo":
             return self._draw_own(own, state, draft)
-        if draft:
-            shown = pipeline.draft(state, self._rested)
-        else:
-            shown = frame(state, with_curves=False)
+        shown = drawn(state, draft, self._rested)
         self._send(self._contents(state, shown, draft), shown.scene, draft)
         if draft:
             return None
         self._rested = state
         # Heads first: a new target's curves cost a sweep and a posterior
-        plot = plots.plots(plots_of(state), shown.scene.numbers, hide=state.hide)
+        plot = shown.curves
         self._curves_of = curve_key(state.target, state.fitting)
-        self._send([(self._panel.places.plots, plot), *self._others(state)])
-        return Rest(sliders_of(state), None, shown.scene.numbers)
+        self._send([(self._panel.places.plots, plot), *self._others(shown)])
+        return Rest(shown.sliders, None, shown.scene.numbers)
 
     def _draw_own(self, own: OwnPhoto | None, state: ViewState, draft: bool) -> Rest | None:
         shown = own_frame(own, state, draft)
-        self._send(self._own_contents(own, state, shown, draft), shown.scene, draft)
+        self._send(self._own_contents(own, state, shown, draft), whole(shown.scene), draft)
         if draft:
             return None
         return Rest(shown.sliders, told_distance(own, state), shown.scene.numbers)
@@ -82,20 +79,14 @@ class Display:
         actual = None if "actual" in state.hide else state.actual
         return figures.heading(state.fitting.distance, actual, points)
 
-    def _others(self, state: ViewState) -> Contents:
+    def _others(self, shown: Drawn) -> Contents:
         """Other faces behind the same points, and those that were kept."""
-        at, pins = self._panel.places, pins_of(state)
-        return [
-            (at.flex, figures.flex_words(flex_lines(state))),
-            (at.spectrum, figures.spectrum(*spectrum_of(state))),
-            (at.pins, figures.pins(pins.names, pins.words, pins.d_s_mm)),
-        ]
+        at = self._panel.places
+        return [(at.flex, shown.flex), (at.spectrum, shown.spectrum), (at.pins, shown.pins)]
 
     def _send(self, html: Contents, scene: Scene | None = None, draft: bool = False) -> None:
         if self._gone():  # while this was computed
             return
-        if scene is not None:
-            whole(scene)
         with self._client.atomic():
             if scene is not None:
                 self._stage.show(scene, draft)
@@ -103,25 +94,22 @@ class Display:
                 handle.content = content
         self._client.flush()
 
-    def _contents(self, state: ViewState, shown: Frame, draft: bool) -> Contents:
+    def _contents(self, state: ViewState, shown: Drawn, draft: bool) -> Contents:
         """What the elements of the panel show of a frame."""
-        at, scene, hide = self._panel.places, shown.scene, state.hide
-        cards = figures.cards(scene.numbers, hide=hide)
-        marks = photograph.photo_marks(scene.photo, crosses=False, hover=not draft)
+        at = self._panel.places
         html: Contents = []
-        crosses = (state.target, scene.photo.points_shown)
+        crosses = (state.target, shown.scene.photo.points_shown)
         if crosses != self._crosses_of:  # 0.3 ms that a hand on the distance does not need
-            html.append((at.crosses, photograph.photo_crosses(scene.photo)))
+            html.append((at.crosses, shown.crosses))
             self._crosses_of = crosses
         if self._stage.narrow:
-            html.append((at.marks, figures.side_by_side(marks, cards)))
+            html.append((at.marks, shown.side_by_side))
         else:
-            html += [(at.cards, cards), (at.marks, marks)]
+            html += [(at.cards, shown.cards), (at.marks, shown.marks)]
         if (
             curve_key(state.target, state.fitting) == self._curves_of
         ):  # else at rest, when all else is shown
-            curves = plots.plots(plots_of(state), scene.numbers, hide=hide, brief=draft)
-            html.append((at.plots, curves))
+            html.append((at.plots, shown.curves))
         if (state.target, draft) != self._picture_of and not (
             draft and self._picture_of == (state.target, False)
         ):
@@ -161,13 +149,11 @@ class Display:
             ]
         return html
 
-    def _at_rest(self, state: ViewState, shown: Frame) -> Contents:
-        at, scene = self._panel.places, shown.scene
-        legend = "" if scene.legend is None else figures.legend(scene.legend)
-        spoken = figures.spoken(scene.numbers, hide=state.hide) + figures.heads_words(scene)
+    def _at_rest(self, state: ViewState, shown: Drawn) -> Contents:
+        at = self._panel.places
         return [
-            (at.legend, figures.told(told(state)) + legend),
-            (at.spoken, spoken),
+            (at.legend, shown.legend),
+            (at.spoken, shown.spoken),
             (at.data, self._panel.spoken(state) + text_size(state.text)),
-            (at.heading, self._heading(state, shown.points)),
+            (at.heading, self._heading(state, shown.frame.points)),
         ]

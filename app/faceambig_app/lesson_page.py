@@ -26,8 +26,18 @@ def html_of(markdown: str) -> str:
     return _markdown().render(markdown)
 
 
-def step_html(lesson: Lesson, number: int, *, said: str | None, ticked: Collection[int]) -> str:
-    """A step as the learner sees it. said: what was predicted; ticked: tasks done, counted from 0."""
+def step_html(
+    lesson: Lesson,
+    number: int,
+    *,
+    said: str | None,
+    ticked: Collection[int],
+    held: str | None = None,
+) -> str:
+    """A step as the learner sees it. said: what was predicted; ticked: tasks done, counted from 0.
+
+    held: what was predicted in a class that has not been told yet; a `said` of "" is told without a prediction.
+    """
     step = lesson.steps[number - 1]
     bars = "".join(
         f'<i class="{"fa-on" if k <= number else ""}"></i>' for k in range(1, len(lesson.steps) + 1)
@@ -41,9 +51,12 @@ def step_html(lesson: Lesson, number: int, *, said: str | None, ticked: Collecti
     ]
     if step.ask is not None:
         parts.append(f"<p><b>{escape(step.ask.question)}</b></p>")
+        if said is None and held is not None:
+            parts.append(f'<p class="fa-said">{escape(say("class.held", words=held))}</p>')
         if said is None:
             return _wrapped(parts)
-        parts.append(f'<p class="fa-said">{escape(say("lesson.said", words=said))}</p>')
+        if said:
+            parts.append(f'<p class="fa-said">{escape(say("lesson.said", words=said))}</p>')
         parts.append(html_of(step.answered))
     if step.tasks:
         parts.append(_tasks(step, ticked))

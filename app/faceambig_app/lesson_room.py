@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from html import escape
+from typing import Protocol
 
 from faceambig.scene import Numbers
 
 from .lesson_page import step_html, teacher_html
-from .lessons import Lessons, Step
+from .lessons import Ask, Lessons, Step
 from .panel import Change
 from .panel.lessons import Shown
 from .state import DEFAULT, ViewState, changed
@@ -16,6 +17,19 @@ from .text import say
 
 OF_THE_READER = ("theme", "text")  # a step leaves them: they are about eyes
 Place = tuple[int, int]  # lesson and step
+
+
+class Class(Protocol):
+    """The class that a browser may be part of."""
+
+    @property
+    def leads(self) -> bool:
+        """Whether this browser leads it: it asks and answers nothing."""
+        ...
+
+    def holds(self, place: Place, answer: float) -> bool:
+        """Take an answer, a number or a choice counted from 0; whether what it hides is told later, to all."""
+        ...
 
 
 class LessonRoom:
@@ -28,10 +42,13 @@ class LessonRoom:
         tell: Callable[[Change], None],
         notice: Callable[[str], None],
         show: Callable[[Shown], None],
+        of: Class | None = None,
     ) -> None:
         self._lessons, self._now, self._tell = lessons, now, tell
         self._notice, self._show = notice, show
-        self._said: dict[Place, str] = {}
+        self._class = of
+        self._said: dict[Place, str] = {}  # "": told without an answer
+        self._held: dict[Place, str] = {}  # answers to what a class has not been told yet
         self._ticked: dict[Place, set[int]] = {}
 
     @property
@@ -50,7 +67,7 @@ class LessonRoom:
         step, place = self._place(state)
         if step is None or place is None:
             return state
-        if step.ask is not None and place not in self._said:
+        if step.ask is not None and place not in self._said and not self._leads:
             self._notice(say("lesson.first"))
             return state
         number, k = place
@@ -91,9 +108,20 @@ class LessonRoom:
         step, place = self._place(self._now())
         if step is None or place is None or step.ask is None:
             return
-        self._said[place] = words
-        self._tell(_numbers_told)
+        if self._class is not None and self._class.holds(place, _answer(step.ask, words)):
+            self._held[place] = words
+        else:
+            self._said[place] = words
+            self._tell(_numbers_told)
         self.watch(self._now())
+
+    def reveal(self, place: Place) -> None:
+        """A class is told what a question hides: with the learner's own answer, if there is one."""
+        self._said.setdefault(place, self._held.pop(place, ""))
+
+    @property
+    def _leads(self) -> bool:
+        return self._class is not None and self._class.leads
 
     def watch(self, state: ViewState, numbers: Numbers | None = None) -> None:
         """A state is now what is; at rest with its numbers. Tick what the learner has done, and show it."""
@@ -105,11 +133,14 @@ class LessonRoom:
         if step.ask is None or said is not None:
             ticked |= {k for k, task in enumerate(step.tasks) if task.when.holds(state, numbers)}
         lesson, asks = self._lessons.by_number[place[0]], step.ask is not None and said is None
-        number = step.ask.number if asks and step.ask is not None else None
+        ask = step.ask if asks and not self._leads else None
+        number = None if ask is None else ask.number
         self._show(
             Shown(
-                html=step_html(lesson, place[1], said=said, ticked=ticked),
-                choices=step.ask.choices if asks and step.ask is not None else (),
+                html=step_html(
+                    lesson, place[1], said=said, ticked=ticked, held=self._held.get(place)
+                ),
+                choices=() if ask is None else ask.choices,
                 number=None if number is None else (number.low, number.high, number.unit),
                 tools=() if asks else step.tools,
                 teacher=teacher_html(lesson),
@@ -133,6 +164,11 @@ class LessonRoom:
     def _problems(self) -> str:
         lines = "".join(f"<p>{escape(line)}</p>" for line in self._lessons.problems)
         return f'<div class="fa fa-small">{lines}</div>' if lines else ""
+
+
+def _answer(ask: Ask, words: str) -> float:
+    """An answer as a class counts it, in whatever language it was given."""
+    return float(words.split()[0]) if ask.number is not None else float(ask.choices.index(words))
 
 
 def _left(state: ViewState) -> ViewState:

@@ -21,10 +21,12 @@ import viser
 
 from . import guard
 from .browser import Browser
+from .classroom import Classroom
 from .fields import FIELDS
 from .fits import model
 from .lessons import lessons
 from .orders import Orders
+from .panel.classroom import invitation
 from .panel.data import POINTS
 from .panel.export import STATES
 from .pipeline import frame
@@ -45,9 +47,11 @@ class Page:
         port: int,
         *,
         token: str | None = None,
+        lead: str | None = None,
         allowed: Collection[str] = (),
         limits: guard.Limits | None = None,
     ) -> None:
+        """lead: the secret of who leads a class; without it there is none, and everybody is alone."""
         model(DEFAULT.model)  # before the first browser comes
         frame(DEFAULT)
         lessons()
@@ -58,13 +62,19 @@ class Page:
             host,
             port,
             token=token,
+            lead=lead,
             allowed=allowed,
             limits=limits,
             keys=("v", *FIELDS),
             title=say("app.title"),
             hooks=hooks,
         )
-        self._token, self._allowed = token, allowed
+        self._token, self._lead, self._allowed = token, lead, allowed
+        self._class = None if lead is None else Classroom(lessons())
+        self._invitation = ""
+        if self._class is not None:
+            room = self.links[0]
+            self._invitation = invitation(room, guard.qr_svg(room))
         # For everybody and before the first browser: a client that learns "up" later keeps its camera's old one
         self._server.scene.set_up_direction("+y")
         self._server.initial_camera.up = (0.0, 1.0, 0.0)
@@ -77,7 +87,10 @@ class Page:
     async def _enter(
         self, client: viser.ClientHandle
     ) -> None:  # async: on the loop, before any message of this client
-        browser = Browser(client, self._dispatcher, self._orders, asyncio.get_running_loop())
+        browser = Browser(
+            client, self._dispatcher, self._orders, asyncio.get_running_loop(), self._class,
+            leads=guard.leads(), invitation=self._invitation,
+        )  # fmt: skip
         self._browsers[client.client_id] = browser
         browser.open()
 
@@ -108,6 +121,14 @@ class Page:
         brings = "" if self._token is None else f"?token={self._token}"
         places = guard.links(self._server.get_host(), self._server.get_port(), self._allowed)
         return [place + brings for place in places]
+
+    @property
+    def leader_link(self) -> str | None:
+        """What to keep: who opens it leads the class. None where there is no class."""
+        if self._lead is None:
+            return None
+        places = guard.links(self._server.get_host(), self._server.get_port(), self._allowed)
+        return f"{places[0]}?lead={self._lead}"
 
     def close(self) -> None:
         """Stop serving; returns within two seconds."""
@@ -151,8 +172,9 @@ def serve(
     token: str | None = None,
     allowed: Collection[str] = (),
     limits: guard.Limits | None = None,
+    present: bool = False,
 ) -> int:
-    """Serve the page until SIGINT or SIGTERM; the exit status."""
+    """Serve the page until SIGINT or SIGTERM; the exit status. present: for a class, which one browser leads."""
     status: int | None = None
 
     def stop(number: int, _: FrameType | None) -> None:
@@ -165,11 +187,18 @@ def serve(
         signal.signal(number, stop)
     if token is None and guard.needs_token(host, allowed):
         token = guard.make_token()
-    page = Page(host, port, token=token, allowed=allowed, limits=limits)
+    lead = guard.make_token() if present else None
+    page = Page(host, port, token=token, lead=lead, allowed=allowed, limits=limits)
     first, *others = page.links
     print(f"faceambig is at {first} (Ctrl-C ends it)")
     for link in others:
         print(f"and at {link}")
+    if page.leader_link is not None:
+        print(
+            f"Whoever opens {page.leader_link} leads the class: keep it. The others follow by the link above."
+        )
+        if not guard.needs_token(host, allowed):
+            print("This machine alone can open them: for a class give --host 0.0.0.0 too.")
     if token is not None:
         print("Whoever has the link is let in, and is then known by a cookie.")
         if sys.stdout.isatty():

@@ -59,6 +59,14 @@ border:1.5px solid var(--fa-dim);color:var(--fa-dl);font-weight:700;margin-top:.
 .fa-done span{border-color:var(--fa-dl)}
 """
 
+_ROOM = """
+.fa-room button{border:0;padding:0;background:none;cursor:zoom-in;width:100%;max-width:13em;display:block}
+.fa-room p{overflow-wrap:anywhere}.fa-room svg{display:block;width:100%;height:auto}
+#fa-room{background:#FFF;color:#1D2733;border:0;border-radius:12px;padding:16px;max-width:92vw}
+#fa-room svg{width:min(78vh,88vw)}#fa-room p{text-align:center;font-size:20px;width:min(78vh,88vw);margin:.4em 0 0}
+#fa-room::backdrop{background:#0009}
+"""
+
 _PHOTO = """
 .fa-photo{position:relative;border-radius:8px;overflow:hidden;background-color:#CBD5E0;background-size:100% 100%;
 aspect-ratio:1}.fa-photo svg{position:absolute;inset:0;width:100%;height:100%}
@@ -106,7 +114,7 @@ button[aria-pressed=true]{background:var(--fa-dl)!important;color:var(--fa-on)!i
 .fa-card span{font-size:calc(22px*var(--fa-scale,1))}}
 """
 
-STYLE = f"<style>{_TOKENS}{_TEXT}{_CARDS}{_LESSON}{_PHOTO}{_PLOTS}{_VISER}</style>"
+STYLE = f"<style>{_TOKENS}{_TEXT}{_CARDS}{_LESSON}{_ROOM}{_PHOTO}{_PLOTS}{_VISER}</style>"
 
 
 def text_size(scale: float) -> str:

@@ -24,7 +24,7 @@ import pytest
 import viser
 
 from faceambig_app import browser as browser_module
-from faceambig_app import display, pipeline, server
+from faceambig_app import drawn, pipeline, server
 from faceambig_app.link import query
 from faceambig_app.panel import Panel
 from faceambig_app.room import Room
@@ -119,12 +119,12 @@ class Fault:
 # Each: where a frame is computed or drawn, and by whom it is called
 STEPS: dict[str, tuple[Any, str]] = {
     "fit and scene, while a hand moves": (pipeline, "draft"),
-    "fit and scene, at rest": (display, "frame"),
-    "curves": (display, "plots_of"),
+    "fit and scene, at rest": (drawn, "frame"),
+    "curves": (drawn, "plots_of"),
     "heads": (Stage, "show"),
-    "photograph": (display.photograph, "photo_marks"),
-    "cards": (display.figures, "cards"),
-    "told": (display, "told"),
+    "photograph": (drawn.photograph, "photo_marks"),
+    "cards": (drawn.figures, "cards"),
+    "told": (drawn, "told"),
 }
 ERRORS = (
     ValueError("a value\nof two lines"),
@@ -144,6 +144,7 @@ def test_an_error_at_any_call_is_told_and_the_next_drag_works(monkeypatch, come,
     error = ERRORS[(list(STEPS).index(step) + n) % len(ERRORS)]
     fault = Fault(getattr(owner, name), n, error)
     monkeypatch.setattr(owner, name, fault)
+    monkeypatch.setattr(drawn, "_KEPT", drawn.Kept(1))  # of what was drawn before
     for at in itertools.cycle((20, 30, 25, 35)):  # until the call has come
         drag(wire, at)
         if fault.happened.wait(0.3):
@@ -163,7 +164,7 @@ def test_an_error_at_any_call_is_told_and_the_next_drag_works(monkeypatch, come,
 
 def test_numbers_that_are_none_are_refused_before_they_are_sent(monkeypatch, come):
     wire = come()
-    real, spoilt = display.frame, threading.Event()
+    real, spoilt = drawn.frame, threading.Event()
 
     def nan_once(*args: Any, **options: Any) -> Any:
         shown = real(*args, **options)
@@ -183,7 +184,7 @@ def test_numbers_that_are_none_are_refused_before_they_are_sent(monkeypatch, com
         stage(self, scene, draft)
 
     monkeypatch.setattr(Stage, "show", look)
-    monkeypatch.setattr(display, "frame", nan_once)
+    monkeypatch.setattr(drawn, "frame", nan_once)
     drag(wire, 30)
     assert wire.wait(lambda: wire.notices, SOON)
     assert "not finite" in wire.notices[0]

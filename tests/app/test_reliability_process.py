@@ -23,14 +23,14 @@ MAIN = "import sys; from faceambig_app.cli import main; sys.exit(main())"
 # All that is computed for a browser takes a minute
 SLOW = """
 import time
-from faceambig_app import display, pipeline
+from faceambig_app import drawn, pipeline
 def slow(real):
     def call(*a, **o):
         print("busy", flush=True)
         time.sleep(60)
         return real(*a, **o)
     return call
-display.frame, pipeline.draft = slow(display.frame), slow(pipeline.draft)
+drawn.frame, pipeline.draft = slow(drawn.frame), slow(pipeline.draft)
 """
 
 

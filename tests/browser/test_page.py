@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 
-from faceambig_app import ViewState, display, faces, fits
+from faceambig_app import ViewState, drawn, faces, fits
 from visitor import PATIENCE, SEEN
 
 pytestmark = pytest.mark.browser
@@ -122,14 +122,14 @@ def test_what_is_typed_is_clamped_in_words_and_what_is_no_number_changes_nothing
 
 def test_an_error_is_a_red_line_and_the_last_face_stays(me, monkeypatch):
     fit = me.mesh("/fit/head")
-    real = display.frame
+    real = drawn.frame
 
     def fails(state, **options):
         if abs(state.distance - 0.66) < 1e-9:
             raise RuntimeError("a planted error")
         return real(state, **options)
 
-    monkeypatch.setattr(display, "frame", fails)
+    monkeypatch.setattr(drawn, "frame", fails)
     me.type_distance("66")
     me.tab.get_by_text("a planted error").first.wait_for(timeout=PATIENCE)
     assert np.abs(me.mesh("/fit/head") - fit).max() == 0

@@ -21,6 +21,11 @@ def add(command: argparse.ArgumentParser) -> None:
         "addresses than 127.0.0.1",
     )
     command.add_argument(
+        "--present",
+        action="store_true",
+        help="for a class: who opens the leader's link leads, all others follow; give --host 0.0.0.0 too",
+    )
+    command.add_argument(
         "--allow-host",
         action="append",
         default=[],
@@ -47,4 +52,7 @@ def run(options: argparse.Namespace) -> int:
 
     token = guard.make_token() if options.token == "" else options.token
     limits = guard.Limits(sessions=options.max_sessions, idle=60 * options.idle_minutes)
-    return serve(options.host, options.port, token=token, allowed=options.allow_host, limits=limits)
+    return serve(
+        options.host, options.port, token=token, allowed=options.allow_host, limits=limits,
+        present=options.present,
+    )  # fmt: skip

@@ -17,19 +17,19 @@ from .data import add_colours, data_html
 from .door import Door, Hooks, ServeError, log_line
 from .downloads import send_file
 from .hooks import install, opened
-from .invitation import links, qr_code
+from .invitation import links, qr_code, qr_svg
 from .messages import MAX_BAD, MAX_MESSAGE
 from .page import PATCHES, make_page, our_script
 from .reports import MAX_REPORT, add_reports
 from .requests import listen
-from .sessions import Limits
+from .sessions import Limits, leads
 from .uploads import MAX_UPLOAD, add_upload
 from .values import TYPING, restate
 
 __all__ = [
     "MAX_BAD", "MAX_MESSAGE", "MAX_REPORT", "MAX_UPLOAD", "PATCHES", "TYPING", "Hooks", "Limits", "ServeError",
-    "add_colours", "add_reports", "add_upload", "data_html", "links", "log_line", "make_token", "needs_token",
-    "qr_code", "restate", "send_file", "start",
+    "add_colours", "add_reports", "add_upload", "data_html", "leads", "links", "log_line", "make_token", "needs_token",
+    "qr_code", "qr_svg", "restate", "send_file", "start",
 ]  # fmt: skip
 
 
@@ -38,6 +38,7 @@ def start(
     port: int = 8080,
     *,
     token: str | None = None,
+    lead: str | None = None,
     allowed: Collection[str] = (),
     limits: Limits | None = None,
     keys: Collection[str] = (),
@@ -49,7 +50,8 @@ def start(
     """A viser server on an address of this machine; port 0 takes a free one (`get_port`). Prints nothing.
 
     Where others can reach it (`needs_token`) it needs a `token`, which a link brings as `?token=`. `allowed` are names
-    it goes by besides its address: NAME or NAME:PORT of a proxy with TLS, or NAME with its own port.
+    it goes by besides its address: NAME or NAME:PORT of a proxy with TLS, or NAME with its own port. Who comes with the
+    secret `lead` as `?lead=` leads a class: `leads` tells it of the running connection.
     `keys` are the names that may stand in the page's address beside those of viser that do no harm. `script` and
     `patches` replace our script and our mends of viser's bundle; tests show with them what happens without.
     """
@@ -57,7 +59,7 @@ def start(
     listener = listen(host, port)
     try:
         address, port = listener.getsockname()[:2]
-        access = make_access(address, port, token, allowed)
+        access = make_access(address, port, token, allowed, lead)
         page = make_page(
             our_script() if script is None else script,
             title,

@@ -2,7 +2,8 @@
 
 On 127.0.0.1 whoever sits at this machine is let in. At any other address, and behind a proxy, only who has come by the
 link with the token; the browser is then known by a cookie. The cookie is made of the token alone: a server that starts
-again with the same token still knows its browsers.
+again with the same token still knows its browsers. Who leads a class comes by a link with another secret, and has a
+second cookie.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ class Access:
     origins: Mapping[str, str]  # value of Host -> the only page that may connect
     anywhere: bool  # listens at all addresses of this machine, and goes by the one where it is met
     token: str | None = None
+    lead: str | None = None  # of the link of who leads a class
 
     def origin(self, host: str, address: str) -> str | None:
         """The origin of our own page for a value of Host; None if that is not us. `address`: where it was met."""
@@ -43,31 +45,38 @@ class Access:
     @property
     def cookie(self) -> tuple[str, str]:
         """Name and value: browsers do not part cookies by port, so the name does."""
-        secret = hmac.digest((self.token or "").encode(), b"faceambig cookie", "sha256").hex()
-        return f"faceambig-{self.port}", secret
+        return f"faceambig-{self.port}", _cookie(self.token, b"faceambig cookie")
+
+    @property
+    def lead_cookie(self) -> tuple[str, str]:
+        """As `cookie`, of who leads."""
+        return f"faceambig-lead-{self.port}", _cookie(self.lead, b"faceambig leader's cookie")
 
     def knows(self, cookies: Iterable[str]) -> bool:
         """Whether one of the Cookie headers lets in."""
         if self.token is None:
             return True
-        name, secret = self.cookie
-        found = False
-        for piece in ";".join(cookies).split(";"):
-            key, _, value = piece.strip().partition("=")
-            found |= key == name and _same(value, secret)
-        return found
+        return _has(cookies, *self.cookie)
+
+    def leads(self, cookies: Iterable[str]) -> bool:
+        """Whether one of the Cookie headers is of who leads."""
+        return self.lead is not None and _has(cookies, *self.lead_cookie)
 
     def takes(self, tokens: Collection[str]) -> bool:
         """Whether the tokens of a link are one and ours."""
-        return (
-            self.token is not None
-            and len(tokens) == 1
-            and all(_same(one, self.token) for one in tokens)
-        )
+        return _is_one(tokens, self.token)
+
+    def takes_lead(self, secrets_: Collection[str]) -> bool:
+        """Whether the secrets of a leader's link are one and ours."""
+        return _is_one(secrets_, self.lead)
 
 
 def make_access(
-    address: str, port: int, token: str | None, allowed: Collection[str] = ()
+    address: str,
+    port: int,
+    token: str | None,
+    allowed: Collection[str] = (),
+    lead: str | None = None,
 ) -> Access:
     """Who may come in at `address`; a server that others can reach needs a token.
 
@@ -79,7 +88,15 @@ def make_access(
     names = {host: f"http://{host}" for host in own} | host_names(allowed, port)
     if token is None and needs_token(address, allowed):
         raise ServeError(f"host {address}: others can reach it, so it needs a token")
-    return Access(port, names, anywhere, None if token is None else _checked_token(token))
+    if lead is not None and lead == token:
+        raise ServeError("lead: the token of all is no secret of who leads: leave it out")
+    return Access(
+        port,
+        names,
+        anywhere,
+        None if token is None else _checked_token(token),
+        None if lead is None else _checked_token(lead),
+    )
 
 
 def needs_token(address: str, allowed: Collection[str] = ()) -> bool:
@@ -110,6 +127,22 @@ def plain_address(address: str) -> str:
     if plain.version == 6:
         return f"[{plain}]" if plain.ipv4_mapped is None else str(plain.ipv4_mapped)
     return str(plain)
+
+
+def _cookie(secret: str | None, use: bytes) -> str:
+    return hmac.digest((secret or "").encode(), use, "sha256").hex()
+
+
+def _has(cookies: Iterable[str], name: str, secret: str) -> bool:
+    found = False
+    for piece in ";".join(cookies).split(";"):
+        key, _, value = piece.strip().partition("=")
+        found |= key == name and _same(value, secret)
+    return found
+
+
+def _is_one(given: Collection[str], ours: str | None) -> bool:
+    return ours is not None and len(given) == 1 and all(_same(one, ours) for one in given)
 
 
 def _same(given: str, ours: str) -> bool:

@@ -8,7 +8,7 @@ import socket
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -62,6 +62,10 @@ class Door:
     hooks: Hooks
     held: dict[tuple[int, str], Held] = field(default_factory=dict)
     sessions: set[Session] = field(default_factory=set)
+
+    def full(self, cookies: Collection[str]) -> bool:
+        """Whether there is no room for who has these cookies; for who leads there always is."""
+        return len(self.sessions) >= self.limits.sessions and not self.access.leads(cookies)
 
     def failed(self, client_id: int | None, error: BaseException) -> None:
         log_line(f"{type(error).__name__}: {error}")

@@ -146,10 +146,11 @@ def _serve(handler: Callable[[Any], Awaitable[None]], host: str, port: int, **op
         return _real_serve(handler, host, port, **options)
 
     async def ours(connection: Any) -> None:
-        if len(door.sessions) >= door.limits.sessions:  # several came in at once
+        cookies = connection.request.headers.get_all("Cookie")
+        if door.full(cookies):  # several came in at once
             await connection.close(1013, "too many browsers")
             return
-        session = Session(door.limits, connection)
+        session = Session(door.limits, connection, leads=door.access.leads(cookies))
         DOOR.set(door)
         SESSION.set(session)
         door.sessions.add(session)

@@ -35,6 +35,15 @@ def _met(anywhere: ipaddress.IPv4Address | ipaddress.IPv6Address) -> str:
     return "127.0.0.1" if four else "::1"
 
 
+def qr_svg(link: str) -> str:
+    """The link as an <svg> element that takes the room it gets: black on white, whatever the page's colours are."""
+    import segno
+
+    return segno.make(link, error="m").svg_inline(
+        border=MARGIN, dark="#000", light="#fff", omitsize=True
+    )
+
+
 def qr_code(link: str) -> str:
     """The link as a picture of characters, two modules above each other in one."""
     import segno  # only where a link is shown

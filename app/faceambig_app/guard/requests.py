@@ -27,6 +27,7 @@ HEADERS = {
 }
 
 LINKLESS = "This page needs its link, with the token: whoever serves it has it."
+LEADERLESS = "This link does not lead the class of this server: take the one that it printed when it started."
 AGAIN = "again"  # in an address: asked for once more
 
 
@@ -43,7 +44,7 @@ def answer(door: Door, address: str, request: Request) -> Response | None:
     if path not in ("/", "/index.html") or not query.isascii():
         return reply(404, "There is one page, /.")
     pieces = query.split("&") if query else []
-    if access.token is not None:
+    if access.token is not None or access.lead is not None:
         entering = _entered(access, request, pieces, origin)
         if entering is not None:
             return entering
@@ -88,7 +89,7 @@ def _joined(door: Door, request: Request, origin: str, path: str) -> Response | 
         return reply(403, LINKLESS)
     if path != "/":
         return reply(404, "There is one page, /.")
-    if len(door.sessions) >= door.limits.sessions:
+    if door.full(request.headers.get_all("Cookie")):
         return reply(503, "Too many browsers: try again when one has left.")
     return None
 
@@ -97,13 +98,24 @@ def _entered(
     access: Access, request: Request, pieces: Sequence[str], origin: str
 ) -> Response | None:
     """The answer to who comes with a token, or without one; None to who has come in before."""
-    rest = [piece for piece in pieces if piece.partition("=")[0] not in ("token", AGAIN)]
+    taken = ("token", AGAIN) if access.lead is None else ("token", "lead", AGAIN)
+    rest = [piece for piece in pieces if piece.partition("=")[0] not in taken]
     place = "/?" + "&".join(rest) if rest else "/"
-    tokens = [piece.partition("=")[2] for piece in pieces if piece.partition("=")[0] == "token"]
-    if access.takes(tokens):
-        name, secret = access.cookie
+    tokens = _values(pieces, "token")
+    secrets = _values(pieces, "lead") if access.lead is not None else []
+    cookies: list[tuple[str, str]] = []
+    if secrets:
+        if not access.takes_lead(secrets):
+            return reply(401, LEADERLESS)
+        cookies.append(access.lead_cookie)
+    if access.token is not None and (cookies or access.takes(tokens)):
+        cookies.append(access.cookie)
+    if cookies:
         flags = "Path=/; HttpOnly; SameSite=Strict" + "; Secure" * origin.startswith("https:")
-        return reply(303, "", Location=place, **{"Set-Cookie": f"{name}={secret}; {flags}"})
+        entered = reply(303, "", Location=place)
+        for name, secret in cookies:  # a name that is there already is added to, never replaced
+            entered.headers["Set-Cookie"] = f"{name}={secret}; {flags}"
+        return entered
     if access.knows(request.headers.get_all("Cookie")):
         return None if len(rest) == len(pieces) else reply(303, "", Location=place)
     # From a link on another site a browser sends no strict cookie, not even after a redirect: it asks once more itself.
@@ -111,6 +123,10 @@ def _entered(
         once_more = f"0; url={place}{'&' if rest else '?'}{AGAIN}"
         return reply(401, LINKLESS, Refresh=once_more)
     return reply(401, LINKLESS)
+
+
+def _values(pieces: Sequence[str], name: str) -> list[str]:
+    return [piece.partition("=")[2] for piece in pieces if piece.partition("=")[0] == name]
 
 
 def dress(door: Door, address: str, request: Request, response: Response) -> None:

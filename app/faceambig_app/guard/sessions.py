@@ -48,10 +48,11 @@ class Limits:
 class Session:
     """One connection, from its handshake to its end."""
 
-    def __init__(self, limits: Limits, connection: Any) -> None:
+    def __init__(self, limits: Limits, connection: Any, *, leads: bool = False) -> None:
         self._loop = asyncio.get_running_loop()
         self._limits = limits
         self._connection: Any = connection
+        self.leads = leads  # whether it came by the link of who leads a class
         self.shown = False  # whether its first camera has come
         self.at_work = 0
         self.buffer: AsyncMessageBuffer | None = None
@@ -125,6 +126,12 @@ class Session:
 
 
 SESSION: ContextVar[Session | None] = ContextVar("session of the running connection", default=None)
+
+
+def leads() -> bool:
+    """Whether the running connection is of who leads a class; False outside of any."""
+    session = SESSION.get()
+    return session is not None and session.leads
 
 
 async def produce(websocket: Any, buffer: Any, client_id: Any, *rest: Any, **options: Any) -> None:

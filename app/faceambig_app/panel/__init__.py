@@ -14,7 +14,7 @@ import viser
 from ..guard import data_html
 from ..state import ViewState
 from ..text import distance_text, say
-from . import compare, data, explore, export, flex, lessons, view
+from . import classroom, compare, data, explore, export, flex, lessons, view
 from .widgets import Change as Change
 from .widgets import Tell, Widgets
 
@@ -59,15 +59,23 @@ class Panel:
         use_hint: Callable[[], None],
         saving: export.Does,
         lessons_do: lessons.Does,
+        class_do: classroom.Does | None = None,
+        invitation: str = "",
     ) -> None:
         self.widgets = w = Widgets(gui, tell, act)
         gui.set_panel_label(say("app.title"))
         style = gui.add_html("")
+
+        def build_class() -> classroom.Classroom | None:
+            return None if class_do is None else classroom.Classroom(w, class_do, invitation)
+
         if narrow:  # one panel: the photograph comes first, beside the numbers
+            self.classroom = build_class()
             photo = self._photo(w, lessons_do)
         else:
             side = gui.add_panel()
             with side.add_tab(say("panel.photo")):
+                self.classroom = build_class()
                 photo = self._photo(w, lessons_do)
             side.dock_left()
             side.set_width(SIDE_WIDTH)

@@ -1,0 +1,138 @@
+"""Drawn: what every browser shows of one state, computed when the first one asks.
+
+Thirty followers of a class are at one state: heads, words and plots are made once, and only sent thirty times. The last
+few states are kept; a second worker that asks for what the first is computing waits for it.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import TypeVar
+
+from . import figures, photograph, pipeline, plots
+from .pipeline import Frame, frame, plots_of
+from .scenes import whole
+from .state import DEFAULT, ViewState, changed
+from .told import Slider, flex_lines, pins_of, sliders_of, spectrum_of, told
+
+KEPT = 12  # states; each holds its heads, some megabytes
+
+_T = TypeVar("_T")
+
+
+class Drawn:
+    """One state, at rest or as a draft: its frame, and its words and plots as HTML."""
+
+    def __init__(self, state: ViewState, shown: Frame, draft: bool) -> None:
+        self.state, self.frame, self.scene = state, shown, whole(shown.scene)
+        self._draft = draft
+
+    @cached_property
+    def cards(self) -> str:
+        """The two numbers."""
+        return figures.cards(self.scene.numbers, hide=self.state.hide)
+
+    @cached_property
+    def marks(self) -> str:
+        """The circles on the photograph."""
+        return photograph.photo_marks(self.scene.photo, crosses=False, hover=not self._draft)
+
+    @cached_property
+    def crosses(self) -> str:
+        """Its points."""
+        return photograph.photo_crosses(self.scene.photo)
+
+    @cached_property
+    def side_by_side(self) -> str:
+        """Circles and numbers, where there is no second panel."""
+        return figures.side_by_side(self.marks, self.cards)
+
+    @cached_property
+    def curves(self) -> str:
+        """The plots; of a new target a sweep and a posterior."""
+        return plots.plots(
+            plots_of(self.state), self.scene.numbers, hide=self.state.hide, brief=self._draft
+        )
+
+    @cached_property
+    def legend(self) -> str:
+        """Which face stands for the fitted one, and the scale of colours."""
+        legend = "" if self.scene.legend is None else figures.legend(self.scene.legend)
+        return figures.told(told(self.state)) + legend
+
+    @cached_property
+    def spoken(self) -> str:
+        """In words, for screen readers."""
+        words = figures.spoken(self.scene.numbers, hide=self.state.hide)
+        return words + figures.heads_words(self.scene)
+
+    @cached_property
+    def flex(self) -> str:
+        """What the flexibility modes move."""
+        return figures.flex_words(flex_lines(self.state))
+
+    @cached_property
+    def spectrum(self) -> str:
+        """How far each of them may."""
+        return figures.spectrum(*spectrum_of(self.state))
+
+    @cached_property
+    def pins(self) -> str:
+        """The faces kept."""
+        pins = pins_of(self.state)
+        return figures.pins(pins.names, pins.words, pins.d_s_mm)
+
+    @cached_property
+    def sliders(self) -> Sequence[Slider]:
+        """What the sliders of flexibility modes are told."""
+        return sliders_of(self.state)
+
+
+class Kept:
+    """Values by key, the last `most`; each is made once, by the worker that asks first."""
+
+    def __init__(self, most: int = KEPT) -> None:
+        self._most = most
+        self._values: OrderedDict[object, tuple[threading.Lock, list[object]]] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def get(self, key: object, make: Callable[[], _T]) -> _T:
+        """The value at `key`; if `make` fails nothing is kept, and the next who asks tries again."""
+        with self._lock:
+            one, made = self._values.setdefault(key, (threading.Lock(), []))
+            self._values.move_to_end(key)
+            while len(self._values) > self._most:
+                self._values.popitem(last=False)
+        with one:
+            if not made:
+                made.append(make())
+            return made[0]  # pyright: ignore[reportReturnType] - what `make` of this key made
+
+
+_KEPT = Kept()
+
+
+def drawn(state: ViewState, draft: bool, rested: ViewState | None) -> Drawn:
+    """A state as all browsers show it; `rested`: what this one showed in full last, which a draft may need."""
+    state = _plain(state)
+    if not draft:
+        return _KEPT.get(
+            (state, None), lambda: Drawn(state, frame(state, with_curves=False), False)
+        )
+    before = None if rested is None or not _asks(state) else _plain(rested)
+    return _KEPT.get(
+        (state, before, "draft"), lambda: Drawn(state, pipeline.draft(state, before), True)
+    )
+
+
+def _plain(state: ViewState) -> ViewState:
+    """A state without what no picture and no word depends on."""
+    return changed(state, theme=DEFAULT.theme, text=DEFAULT.text)
+
+
+def _asks(state: ViewState) -> bool:
+    """Whether a draft of a state depends on what was shown before."""
+    return state.draw is not None or state.extreme is not None or state.surface == "spread"
