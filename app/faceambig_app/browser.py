@@ -129,7 +129,7 @@ class Browser:
 
     def _unheard(self) -> None:
         """Begin, with or without a word of the page's script."""
-        if not self._greeted and not self.room.left:
+        if self._seat is not None and not self._greeted and not self.room.left:
             self._begin(self.room.state)
         self.room.open()
 

@@ -243,7 +243,7 @@ def bars_html(ask: Ask, answers: list[float], present: int) -> str:
     most = max((count for _, count in counted), default=0) or 1
     rows = "".join(
         f"<li><span>{escape(words)}</span><span>{count}</span>"
-        f'<i style="width:{100 * count / most:.1f}%"></i></li>'
+        + (f'<i style="width:{100 * count / most:.1f}%"></i></li>' if count else "</li>")
         for words, count in counted
     )
     title = escape(say("class.answers", count=len(answers), present=present))

@@ -15,8 +15,10 @@ from typing import Any
 import pytest
 
 from faceambig_app import drawn, guard, server
-from faceambig_app.classroom import bars_html
+from faceambig_app.classroom import Classroom, Seat, bars_html
 from faceambig_app.lessons import Ask, Number, lessons
+from faceambig_app.panel.classroom import Shown
+from faceambig_app.state import DEFAULT, ViewState, changed
 from faceambig_app.text import say
 
 SOON = 60.0  # seconds: other tests share the processors
@@ -213,6 +215,77 @@ def test_answers_are_counted_and_told_when_the_leader_reveals(page, lead, come):
     assert all(says(wire, say("lesson.said", words=choices[1])) for wire in five[:3])
     assert say("lesson.said", words="") not in words(five[4])  # it had said nothing
     assert all(FOLLOWS in words(wire) for wire in (*five[:3], five[4]))
+
+
+def test_a_browser_without_the_pages_script_follows_too(wires, page, lead):
+    leader = lead()
+    wire = wires.Wire(port_of(page))
+    wire._greeted = True  # as if the script had been blocked: no word of it comes
+    assert says(wire, FOLLOWS)
+    move(leader, 70)
+    assert at(wire, "distance", r"[0-9.]+")
+    wire.close()
+
+
+class Chair:
+    """A seat without a browser."""
+
+    def __init__(self, room: Classroom, *, may_lead: bool = False) -> None:
+        self.state, self.told, self.shown = DEFAULT, [], Shown()
+        self.seat = Seat(
+            room, may_lead=may_lead, go=self.go, reveal=self.told.append, show=self.show, now=lambda: self.state
+        )  # fmt: skip
+        self.state = self.seat.arrive(self.state)
+
+    def go(self, state: ViewState) -> None:
+        self.state = state
+
+    def show(self, shown: Shown) -> None:
+        self.shown = shown
+
+    def move(self, **values: Any) -> None:
+        before, self.state = self.state, changed(self.state, **values)
+        self.seat.moved(before, self.state)
+
+
+def test_a_photograph_of_the_leaders_own_goes_nowhere():
+    room = Classroom(lessons())
+    leader, other = Chair(room, may_lead=True), Chair(room)
+    leader.move(subject=3)
+    leader.move(subject="photo", distance=0.5)
+    assert (other.state.subject, other.state.distance) == (3, DEFAULT.distance)
+    assert say("class.private") in other.shown.html
+    assert Chair(room).state.subject == 3
+    leader.move(subject=3)
+    assert other.state == leader.state
+    assert say("class.follows") in other.shown.html
+
+
+def test_one_that_fails_holds_up_nobody(monkeypatch, caplog):
+    room = Classroom(lessons())
+    leader, broken, other = Chair(room, may_lead=True), Chair(room), Chair(room)
+    monkeypatch.setattr(broken.seat, "follow", lambda _: 1 // 0)
+    leader.move(distance=0.5)
+    assert other.state.distance == 0.5
+    assert "could not be told" in caplog.text
+
+
+def test_who_does_not_lead_reveals_nothing():
+    room = Classroom(lessons())
+    leader, other = Chair(room, may_lead=True), Chair(room)
+    leader.state = STEP.state
+    leader.seat.moved(DEFAULT, STEP.state)
+    assert leader.shown.hidden
+    assert other.seat.unhide(other.state) == STEP.state
+    assert not room.revealed
+    assert other.seat.holds(PLACE, 0.0)
+    assert "numbers" not in leader.seat.unhide(leader.state).hide
+    assert room.revealed == {PLACE}
+    assert other.told == [PLACE]
+    late = Chair(room)
+    assert late.told == [PLACE]
+    other.seat.take()  # it has not come by the leader's link
+    assert leader.seat.leads
 
 
 def test_numbers_are_counted_in_ranges():

@@ -162,3 +162,17 @@ def test_a_viser_whose_parts_have_moved_is_refused_at_import():
     assert re.fullmatch(
         rf"faceambig serve: viser 1\.1\.1: {part} is not where it was: .*\n", done.stderr
     )
+
+
+def test_a_class_gets_a_link_to_lead_and_one_to_follow():
+    command = [*SERVE, "--port", "0", "--present"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        said = [process.stdout.readline() for _ in range(3)]
+        process.kill()
+    room = re.search(r"http://\S+/", said[0])
+    lead = re.search(r"(http://\S+/)\?lead=[A-Za-z0-9_-]{22} ", said[1])
+    assert room
+    assert lead
+    assert lead[1] == room[0]
+    assert "--host 0.0.0.0" in said[2]  # nobody else could come
