@@ -92,6 +92,7 @@ def test_every_word_of_the_file_is_asked_for(recorded):
         use_hint=lambda: None,
         saving=MagicMock(),
         lessons_do=MagicMock(),
+        class_do=MagicMock(),
     )
     shown.spoken(DEFAULT)
     exact = {ask.replace("\\", "") for _, ask in ASKED if "[" not in ask}
