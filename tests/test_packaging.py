@@ -158,6 +158,22 @@ def test_changelog_begins_with_this_version() -> None:
     assert versions[0] == PROJECT["version"]
 
 
+def test_release_notes_are_of_versions_newest_first() -> None:
+    text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    heads = re.findall(r"(?m)^## (.*)$", text)
+    found = [
+        re.fullmatch(r"\[(\d+)\.(\d+)\.(\d+)\] - (unreleased|\d{4}-\d\d-\d\d)", h) for h in heads
+    ]
+    assert all(found), heads
+    versions = [tuple(map(int, one.groups()[:3])) for one in found if one]
+    assert versions == sorted(set(versions), reverse=True)
+    assert not any("unreleased" in head for head in heads[1:])
+    kinds = {"Added", "Changed", "Deprecated", "Removed", "Fixed", "Security"}
+    assert set(re.findall(r"(?m)^### (.*)$", text)) <= kinds
+    # What is said of a version is a list, one line each
+    assert not re.findall(r"(?m)^(?!#|- |$).*$", text.partition("\n## ")[2].partition("\n")[2])
+
+
 def test_readme_names_both_commands() -> None:
     readme = (ROOT / "README.md").read_text()
     assert "make demo" in readme
