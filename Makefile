@@ -32,7 +32,7 @@ check: .venv/.dev
 
 # The pages below docs/_build; a warning of Sphinx is an error.
 docs: .venv/.dev
-	.venv/bin/python tools/command_reference.py
+	.venv/bin/python tools/command_reference.py --check
 	.venv/bin/python -m sphinx --fail-on-warning --keep-going --nitpicky --quiet docs docs/_build
 	@echo docs/_build/index.html
 

@@ -5,10 +5,13 @@ from __future__ import annotations
 import doctest
 import importlib.util
 import re
+from dataclasses import asdict
 from pathlib import Path
 from types import ModuleType
 
 import pytest
+
+from faceambig.model import FaceModel
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
@@ -26,8 +29,8 @@ def session(path: Path) -> str:
     return done
 
 
-def tool(name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, ROOT / "tools" / f"{name}.py")
+def tool(name: str, folder: Path = ROOT / "tools") -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, folder / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -72,6 +75,61 @@ def test_page_of_the_library_holds_every_public_name() -> None:
 
     named = re.findall(r"\.\. auto\w+:: (\w+)", (DOCS / "api.md").read_text("utf-8"))
     assert sorted(named) == sorted(faceambig.__all__)
+
+
+def test_fields_of_a_class_are_listed_with_what_the_source_says_beside_them() -> None:
+    from faceambig import Fit
+
+    listed = tool("docstrings", DOCS / "_ext").fields(Fit)
+    assert "* ``alpha: Array`` -- (S,) shape, in standard deviations" in listed
+    assert sum(line.startswith("* ") for line in listed) == len(Fit.__dataclass_fields__)
+
+
+def test_docstrings_mean_nothing_but_their_own_marks() -> None:
+    converted = tool("docstrings", DOCS / "_ext").converted
+    given = """Largest |alpha_j| of `model`.
+
+    E = |x|^2
+
+Parameters
+----------
+box: largest |alpha_j|,
+    in sd.
+
+Raises
+------
+ValueError: *not* a number.
+"""
+    assert [line for line in converted(given.splitlines()) if line] == [
+        r"Largest \|alpha\_j\| of ``model``.",
+        "::",
+        "    E = |x|^2",
+        ".. rubric:: Parameters",
+        r"* ``box``: largest \|alpha\_j\|, in sd.",
+        ".. rubric:: Raises",
+        r"* ``ValueError``: \*not\* a number.",
+    ]
+
+
+def test_gallery_holds_every_experiment_with_its_pictures() -> None:
+    from faceambig.experiments import NAMES
+
+    text = (DOCS / "gallery.md").read_text("utf-8")
+    assert re.findall(r"(?m)^`faceambig reproduce (\w+)`$", text) == list(NAMES)
+    shown = re.findall(r"\]\(gallery/([^)]+)\)", text)
+    assert sorted(shown) == sorted(path.name for path in (DOCS / "gallery").iterdir())
+
+
+@pytest.mark.parametrize("name", ["fig1", "fig4a"])  # the two that cost least
+def test_gallery_says_what_the_experiment_finds(name: str, embedded: FaceModel) -> None:
+    from faceambig.experiments import experiment
+    from faceambig.experiments.protocol import Settings, silent
+
+    outcome = experiment(name).run(Settings(embedded, "embedded"), silent)
+    row = tool("docs_gallery").claim_row
+    text = (DOCS / "gallery.md").read_text("utf-8")
+    for claim in outcome.claims:
+        assert row(asdict(claim)) in text
 
 
 def test_every_page_is_in_the_table_of_contents() -> None:

@@ -77,6 +77,7 @@ def runner() -> ModuleType:
     return module
 
 
+@pytest.mark.slow
 def test_notebook_of_ten_cells_runs_and_shows_what_is_stored(runner: ModuleType) -> None:
     notebook = json.loads(runner.NOTEBOOK.read_text(encoding="utf-8"))
     assert len(notebook["cells"]) == 10

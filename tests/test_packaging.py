@@ -12,6 +12,7 @@ import tarfile
 import tomllib
 import venv
 import zipfile
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -53,12 +54,15 @@ def installed(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """bin/ of a new environment with the wheel of the source distribution; what it needs is this one's, behind it."""
     folder = tmp_path_factory.mktemp("installed")
     file = built("wheel", source, folder)
+    own_pip = find_spec("pip") is None  # uv makes environments without it
     try:
-        venv.create(folder / "venv", with_pip=True)
+        venv.create(folder / "venv", with_pip=own_pip)
     except subprocess.CalledProcessError as error:  # Debian without python3-venv
         pytest.skip(f"no pip for a new environment: {error}")
     programs = folder / "venv" / "bin"
-    command = [programs / "python", "-m", "pip", "install", "--no-deps", "--no-index", file]
+    python = programs / "python"
+    pip = [python, "-m", "pip"] if own_pip else [sys.executable, "-m", "pip", "--python", python]
+    command = [*pip, "install", "--no-deps", "--no-index", "--no-compile", file]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     (site,) = (folder / "venv").glob("lib/python*/site-packages")
@@ -119,6 +123,7 @@ def test_source_holds_what_builds_tests_and_documents_it(source: Path) -> None:
     assert not list(source.rglob("__pycache__"))
 
 
+@pytest.mark.slow
 def test_wheel_of_the_source_installs_and_runs(installed: Path, tmp_path: Path) -> None:
     program = installed / "faceambig"
     assert ran(program, "--version", cwd=tmp_path) == f"faceambig {PROJECT['version']}\n"
@@ -130,6 +135,7 @@ def test_wheel_of_the_source_installs_and_runs(installed: Path, tmp_path: Path) 
 
 
 @pytest.mark.gl
+@pytest.mark.slow
 def test_what_is_installed_draws_the_page_s_picture(installed: Path, tmp_path: Path) -> None:
     ran(installed / "faceambig", "snapshot", "--out", "face.png", "--width", "600", cwd=tmp_path)
     data = (tmp_path / "face.png").read_bytes()
@@ -156,6 +162,22 @@ def test_changelog_begins_with_this_version() -> None:
         r"^## \[?([0-9][^\]\s]*)", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE
     )
     assert versions[0] == PROJECT["version"]
+
+
+def test_release_notes_are_of_versions_newest_first() -> None:
+    text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    heads = re.findall(r"(?m)^## (.*)$", text)
+    found = [
+        re.fullmatch(r"\[(\d+)\.(\d+)\.(\d+)\] - (unreleased|\d{4}-\d\d-\d\d)", h) for h in heads
+    ]
+    assert all(found), heads
+    versions = [tuple(map(int, one.groups()[:3])) for one in found if one]
+    assert versions == sorted(set(versions), reverse=True)
+    assert not any("unreleased" in head for head in heads[1:])
+    kinds = {"Added", "Changed", "Deprecated", "Removed", "Fixed", "Security"}
+    assert set(re.findall(r"(?m)^### (.*)$", text)) <= kinds
+    # What is said of a version is a list, one line each
+    assert not re.findall(r"(?m)^(?!#|- |$).*$", text.partition("\n## ")[2].partition("\n")[2])
 
 
 def test_readme_names_both_commands() -> None:

@@ -98,7 +98,7 @@ def main() -> int:
     text = page()
     old = not PAGE.is_file() or PAGE.read_text(encoding="utf-8") != text
     if old:
-        print(f"docs/{PAGE.name}: {'is old' if check else 'written'}")
+        print(f"docs/{PAGE.name}: {'is old; run this without --check' if check else 'written'}")
         if not check:
             PAGE.write_text(text, encoding="utf-8")
     return int(check and old)
