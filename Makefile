@@ -15,20 +15,26 @@ LOCKED = $(INSTALL) --no-deps --require-hashes -r
 export OPENBLAS_NUM_THREADS = 1
 export OMP_NUM_THREADS = 1
 
-.PHONY: demo test check fix bench bench-page golden lock head clean for-demo for-test
+.PHONY: demo test check docs fix bench bench-page golden lock head clean for-demo for-test
 .NOTPARALLEL:
 
 demo: for-demo .venv/.app
 	.venv/bin/faceambig serve --port $(PORT)
 
 test: for-test .venv/.dev
-	.venv/bin/python -m pytest -n 2 $(TESTS)
+	.venv/bin/python -m pytest -n 2 --dist worksteal $(TESTS)
 
 check: .venv/.dev
 	.venv/bin/ruff check
 	.venv/bin/ruff format --check
 	.venv/bin/lint-imports --no-logo --no-cache
 	.venv/bin/pyright
+
+# The pages below docs/_build; a warning of Sphinx is an error.
+docs: .venv/.dev
+	.venv/bin/python tools/command_reference.py --check
+	.venv/bin/python -m sphinx --fail-on-warning --keep-going --nitpicky --quiet docs docs/_build
+	@echo docs/_build/index.html
 
 fix: .venv/.dev
 	.venv/bin/ruff check --fix
@@ -62,7 +68,7 @@ head: .venv/.dev
 	.venv/bin/python tools/build_head.py
 
 clean:
-	rm -rf .venv build dist .coverage .hypothesis .pytest_cache .ruff_cache
+	rm -rf .venv build dist docs/_build .coverage .hypothesis .pytest_cache .ruff_cache
 
 for-demo:
 	@tools/system_packages.sh "$(PY)" venv gl

@@ -37,11 +37,11 @@
   }
 
   function cursor() {
-    const group = document.querySelector(`[data-track="${track.name}"] .cursor`);
+    const mark = (kind) => document.querySelector(`[data-track="${track.name}"] .cursor ${kind}`);
     const [x, l, s] = track.cursor.map((values) => between(values, position));
-    group.querySelector("path").setAttribute("transform", `translate(${x} 0)`);
-    group.querySelector("circle").setAttribute("transform", `translate(${x} ${l})`);
-    group.querySelector("rect").setAttribute("transform", `translate(${x - 4.2} ${s - 4.2})`);
+    mark("path").setAttribute("transform", `translate(${x} 0)`);
+    mark("circle").setAttribute("transform", `translate(${x} ${l})`);
+    mark("rect").setAttribute("transform", `translate(${x - 4.2} ${s - 4.2})`);
   }
 
   function circles() {

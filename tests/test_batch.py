@@ -145,7 +145,7 @@ def test_a_dask_cluster_gives_the_same_fits():
         n_workers=2,
         threads_per_worker=1,
         host="127.0.0.1",
-        dashboard_address=None,  # pyright: ignore[reportArgumentType]
+        dashboard_address="127.0.0.1:0",  # any free port: another cluster may run beside it
     )
     with (
         cluster,

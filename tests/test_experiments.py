@@ -123,6 +123,12 @@ def test_the_measured_table_is_met_on_ict(ict, monkeypatch):
 # ---- what an experiment is ----
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_every_name_is_an_experiment_of_that_name(name):
+    found = experiment(name)
+    assert (found.name, bool(found.title), bool(found.paper)) == (name, True, True)
+
+
 @pytest.mark.parametrize("name", OURS)
 def test_an_outcome_says_what_it_is_about(name):
     asked = experiment(name)

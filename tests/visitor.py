@@ -16,7 +16,7 @@ from playwright.sync_api import Page as Tab
 from faceambig_app import server
 from faceambig_app.history import History
 from faceambig_app.link import query
-from faceambig_app.state import DEFAULT, ViewState
+from faceambig_app.state import DEFAULT, ViewState, changed
 
 PATIENCE = 90_000  # milliseconds until something is seen: other tests share the processors
 # Every 37th vertex: enough to see a change, and little to send
@@ -84,6 +84,12 @@ class Visitor:
     def do(self, change: Callable[[], Any]) -> None:
         """Something on the server's loop, as a message of the browser would."""
         self.browser._loop.call_soon_threadsafe(change)
+
+    def goes(self, **values: object) -> None:
+        """To the state with other values, drawn in full."""
+        self.do(lambda: self.browser.change(lambda state: changed(state, **values)))
+        self.until(lambda: self.state == changed(self.state, **values), str(values))
+        self.rest()
 
     def start_again(self) -> None:
         """The first state with an empty past, nothing focused or in the way, the first tab."""

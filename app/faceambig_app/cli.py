@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from .commands import COMMANDS
-from .commands.shared import BAD_INPUT, READER_GONE
+from .commands.shared import BAD_INPUT, READER_GONE, version
 
 
 class Parser(argparse.ArgumentParser):
@@ -30,6 +30,14 @@ class Parser(argparse.ArgumentParser):
             message if len(message) <= 300 else f"{message[:297]}..."
         )  # argparse repeats all of a value
         self.exit(BAD_INPUT, f"{self.prog}: {short}\n")
+
+
+class Version(argparse.Action):
+    """Prints it and ends; asked for only then, since a look into the installed packages takes its time."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
+        print(f"faceambig {version()}")
+        parser.exit()
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -63,6 +71,7 @@ def one_line(error: BaseException) -> str:
 def parser() -> Parser:
     """All commands and their flags."""
     root = Parser(prog="faceambig", description="A photograph of a face does not fix the face.")
+    root.add_argument("--version", action=Version, nargs=0, help="print the version and end")
     commands = root.add_subparsers(
         dest="command", required=True, parser_class=Parser, metavar="COMMAND"
     )

@@ -175,7 +175,7 @@ def described_track(state: ViewState, track: Track, weights: Array) -> dict[str,
         "start": int(np.abs(track.places - begin).argmin()),
         "marks": sorted({int(np.abs(track.places - mark).argmin()) for mark in marks}),
         "along": _short(along, 6),
-        "cursor": [_short(values, 2) for values in (x, y_l, y_s)],
+        "cursor": [_short(values, 4) for values in (x, y_l, y_s)],
         "weights": [_short(row, 7) for row in weights],
         "stops": [stop_words(track, stop) for stop in range(len(track.places))],
     }

@@ -6,9 +6,10 @@ Colours are CSS variables of style.STYLE. The same numbers stand in a table (plo
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from functools import lru_cache
 from html import escape
+from typing import NamedTuple
 
 import numpy as np
 
@@ -43,13 +44,17 @@ def plots(
     true = told and "truth" not in hide
     top = d_s_axis(curves, numbers)
     words = escape(_alternative(curves, numbers) if true else say("plot.alt_hidden"))
-    ground = _ground(curves, numbers.reference, top, told, true, "actual" not in hide)
-    cursor = _cursor(numbers, top, _last(curves, told), told, true)
+    below, above = _still(curves, numbers.reference, top, told, true, "actual" not in hide)
+    x = float(FAR) if numbers.distance is None else _across(numbers.distance)
+    cursor = (
+        f'<path d="{_upright(x, _last(curves, told))}" stroke="var(--fa-ink)" stroke-width="1.6"/>'
+    )
+    marks = _marks(x, numbers, top, true) if told else ""
     said = _said(curves, true, not brief) if told else ""
     return (
         f'<div class="fa"><div class="fa-wide">'
         f'<svg class="fa-plot" viewBox="0 0 {WIDTH} {_ticks_at(curves, told) + 40}" '
-        f'role="img" aria-label="{words}">{ground}{cursor}</svg></div>{said}</div>'
+        f'role="img" aria-label="{words}">{below}{cursor}{above}{marks}</svg></div>{said}</div>'
     )
 
 
@@ -63,22 +68,28 @@ def _ticks_at(curves: Curves, told: bool) -> int:
 
 
 @lru_cache(maxsize=KEPT)
-def _ground(
+def _still(
     curves: Curves, reference: str, top: float, told: bool, true: bool, actual: bool
-) -> str:
-    """All of the plots but the cursor: what stays while a hand moves the distance."""
-    ticks_at = _ticks_at(curves, told)
-    parts = [
-        *_d_l_plot(curves, told),
-        *_d_s_plot(curves, reference, top, true, _hidden(told)),
-        *(_likely_plot(curves) if told and curves.density is not None else ()),
-        *(_tick(cm, ticks_at) for cm in TICKS_CM),
-        _far_tick(ticks_at),
-        f'<text x="{(LEFT + RIGHT) / 2}" y="{ticks_at + 35}" text-anchor="middle">{escape(say("plot.axis"))}</text>',
-        _true_line(curves, _last(curves, told)) if actual else "",
-        _far_marks(curves, top, true) if told else "",
+) -> tuple[str, str]:
+    """All of the plots that stays while a hand moves the distance: what is below the cursor, and what is above it.
+
+    Words are above the upright lines, on a rim of the ground (style.py), so that no line crosses letters; curves are
+    above the words, so that the rim hides no data.
+    """
+    at = _ticks_at(curves, told)
+    shown = [_d_l_plot(curves, told), _d_s_plot(curves, reference, top, true, _hidden(told))]
+    if told and curves.density is not None:
+        shown.append(_likely_plot(curves))
+    true_line, true_words = _true_line(curves, _last(curves, told)) if actual else ("", "")
+    words = [
+        *(plot.words for plot in shown),
+        *(_tick(cm, at) for cm in TICKS_CM),
+        _far_tick(at),
+        f'<text x="{(LEFT + RIGHT) / 2}" y="{at + 35}" text-anchor="middle">{escape(say("plot.axis"))}</text>',
+        true_words,
     ]
-    return "".join(parts)
+    lines = [*(plot.line for plot in shown), _far_marks(curves, top, true) if told else ""]
+    return "".join(plot.ground for plot in shown) + true_line, "".join(words + lines)
 
 
 @lru_cache(maxsize=KEPT)
@@ -170,59 +181,66 @@ def _alternative(curves: Curves, numbers: Numbers) -> str:
     )
 
 
+class Plot(NamedTuple):
+    """SVG of one plot, from below to above."""
+
+    ground: str = ""
+    words: str = ""
+    line: str = ""
+
+
 def _hidden(told: bool) -> str:
     """Why a curve is not there."""
     return say("number.hidden_truth") if told else say("number.hidden")
 
 
-def _d_l_plot(curves: Curves, told: bool) -> list[str]:
+def _d_l_plot(curves: Curves, told: bool) -> Plot:
     band, automatic = _d_l(curves.tolerance_percent), _d_l(AUTOMATIC_PERCENT)
     line = _line(_x(curves.distances), _y(curves.d_l_percent, D_L_MAX, D_L_TOP, D_L_BOTTOM))
-    return [
-        _title(say("plot.d_l"), D_L_TOP, "dl"),
-        f'<path d="M{LEFT} {band:.1f}H{END}V{D_L_BOTTOM}H{LEFT}z" fill="var(--fa-band)"/>',
-        *(_grid(value, D_L_MAX, D_L_TOP, D_L_BOTTOM) for value in (0, 3, 6)),
+    grid, values = _grid((0, 3, 6), D_L_MAX, D_L_TOP, D_L_BOTTOM)
+    return Plot(
+        f'<path d="M{LEFT} {band:.1f}H{END}V{D_L_BOTTOM}H{LEFT}z" fill="var(--fa-band)"/>{grid}'
         f'<path d="M{LEFT} {automatic:.1f}H{END}" stroke="var(--fa-dim)" stroke-dasharray="5 4"/>',
-        _note(automatic + 12, say("plot.automatic")),
-        _note(band + 13, say("plot.band")),
+        _title(say("plot.d_l"), D_L_TOP, "dl")
+        + values
+        + _note(automatic + 12, say("plot.automatic"))
+        + _note(band + 13, say("plot.band"), "b"),
         f'<polyline points="{line}" fill="none" stroke="var(--fa-dl)" stroke-width="2.2" stroke-dasharray="6 3"/>'
         if told
         else "",
-    ]
+    )
 
 
-def _d_s_plot(curves: Curves, reference: str, top: float, true: bool, hidden: str) -> list[str]:
+def _d_s_plot(curves: Curves, reference: str, top: float, true: bool, hidden: str) -> Plot:
     line = _line(_x(curves.distances), _y(curves.d_s_mm, top, D_S_TOP, D_S_BOTTOM))
     title = say("plot.d_s_to", reference=reference) if reference else say("plot.d_s")
-    return [
-        _title(title, D_S_TOP, "ds"),
-        *(_grid(value, top, D_S_TOP, D_S_BOTTOM) for value in range(0, int(top) + 1, 4)),
-        f'<polyline points="{line}" fill="none" stroke="var(--fa-ds)" stroke-width="2.2"/>'
-        if true
-        else _note((D_S_TOP + D_S_BOTTOM) / 2 + 4, hidden),
-    ]
+    grid, values = _grid(range(0, int(top) + 1, 4), top, D_S_TOP, D_S_BOTTOM)
+    words = _title(title, D_S_TOP, "ds") + values
+    if not true:
+        return Plot(grid, words + _note((D_S_TOP + D_S_BOTTOM) / 2 + 4, hidden))
+    return Plot(
+        grid,
+        words,
+        f'<polyline points="{line}" fill="none" stroke="var(--fa-ds)" stroke-width="2.2"/>',
+    )
 
 
-def _likely_plot(curves: Curves) -> list[str]:
+def _likely_plot(curves: Curves) -> Plot:
     """How likely each distance is: an area of equal share a width of the axis, and the two intervals below."""
     assert curves.density is not None
     x, y = _x(curves.distances), _y(curves.density, 1.0, LIKELY_TOP, LIKELY_BOTTOM)
     area = f"M{x[0]:.1f} {LIKELY_BOTTOM}L{_line(x, y)}L{x[-1]:.1f} {LIKELY_BOTTOM}z"
-    parts = [
-        _title(say("plot.likely"), LIKELY_TOP, "ink"),
-        f'<path d="{area}" fill="var(--fa-band)" stroke="var(--fa-ink)" stroke-width="1.4"/>',
-    ]
+    ground = f'<path d="{area}" fill="var(--fa-band)" stroke="var(--fa-ink)" stroke-width="1.4"/>'
+    words = _title(say("plot.likely"), LIKELY_TOP, "ink")
     for share, at, width, (low, high) in zip(
         (50, 95), BARS_AT, (6, 3), curves.intervals, strict=False
     ):
         a, b = (_across(min(max(end, NEAREST), FARTHEST)) for end in (low, high))
-        parts.append(f'<text x="{LEFT - 4}" y="{at + 4}" text-anchor="end">{share}{NARROW}%</text>')
-        parts.append(
-            f'<path d="M{a:.1f} {at}H{b:.1f}" stroke="var(--fa-ink)" stroke-width="{width}"/>'
-        )
+        words += f'<text x="{LEFT - 4}" y="{at + 4}" text-anchor="end">{share}{NARROW}%</text>'
+        ground += f'<path d="M{a:.1f} {at}H{b:.1f}" stroke="var(--fa-ink)" stroke-width="{width}"/>'
         if high > FARTHEST:  # it goes on
-            parts.append(f'<path d="M{b + 1:.1f} {at - 5}l7 5l-7 5z" fill="var(--fa-ink)"/>')
-    return parts
+            ground += f'<path d="M{b + 1:.1f} {at - 5}l7 5l-7 5z" fill="var(--fa-ink)"/>'
+    return Plot(ground, words)
 
 
 def _title(text: str, top: int, tone: str) -> str:
@@ -231,8 +249,10 @@ def _title(text: str, top: int, tone: str) -> str:
     )
 
 
-def _note(y: float, text: str) -> str:
-    return f'<text x="{END - 3}" y="{y:.1f}" text-anchor="end">{escape(text)}</text>'
+def _note(y: float, text: str, of: str = "") -> str:
+    """Words inside a plot; of "b": on its band."""
+    kind = f'class="{of}" ' if of else ""
+    return f'<text {kind}x="{END - 3}" y="{y:.1f}" text-anchor="end">{escape(text)}</text>'
 
 
 def _x(metres: Array) -> Array:
@@ -260,12 +280,14 @@ def _line(x: Array, y: Array) -> str:
     return " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
 
 
-def _grid(value: float, top_value: float, top: int, bottom: int) -> str:
-    y = _at(value, top_value, top, bottom)
-    return (
-        f'<path d="M{LEFT} {y:.1f}H{END}" stroke="var(--fa-line)"/>'
-        f'<text x="{LEFT - 6}" y="{y + 4:.1f}" text-anchor="end">{value:g}</text>'
-    )
+def _grid(values: Iterable[float], top_value: float, top: int, bottom: int) -> tuple[str, str]:
+    """Lines across, and their values."""
+    lines, words = "", ""
+    for value in values:
+        y = _at(value, top_value, top, bottom)
+        lines += f'<path d="M{LEFT} {y:.1f}H{END}" stroke="var(--fa-line)"/>'
+        words += f'<text x="{LEFT - 6}" y="{y + 4:.1f}" text-anchor="end">{value:g}</text>'
+    return lines, words
 
 
 def _tick(cm: int, at: int) -> str:
@@ -300,26 +322,25 @@ def _upright(x: float, last: int) -> str:
     return "".join(f"M{x:.1f} {top}V{bottom}" for top, bottom in plots_at if bottom <= last)
 
 
-def _true_line(curves: Curves, last: int) -> str:
+def _true_line(curves: Curves, last: int) -> tuple[str, str]:
+    """The line of the true distance, and its words; empty where it is off the axis."""
     if not NEAREST <= curves.true_distance <= FARTHEST:
-        return ""
+        return "", ""
     x = _across(curves.true_distance)
     anchor, shift = ("end", -4) if x > (LEFT + RIGHT) / 2 else ("start", 4)
+    words = escape(say("plot.true", distance=centimetres(curves.true_distance)))
     return (
-        f'<path d="{_upright(x, last)}" stroke="var(--fa-dim)" stroke-dasharray="2 3"/>'
-        f'<text x="{x + shift:.1f}" y="{D_S_TOP + 10}" text-anchor="{anchor}">'
-        f"{escape(say('plot.true', distance=centimetres(curves.true_distance)))}</text>"
+        f'<path d="{_upright(x, last)}" stroke="var(--fa-dim)" stroke-dasharray="2 3"/>',
+        f'<text x="{x + shift:.1f}" y="{D_S_TOP + 10}" text-anchor="{anchor}">{words}</text>',
     )
 
 
-def _cursor(numbers: Numbers, d_s_top: float, last: int, told: bool, true: bool) -> str:
-    x = float(FAR) if numbers.distance is None else _across(numbers.distance)
+def _marks(x: float, numbers: Numbers, d_s_top: float, true: bool) -> str:
+    """Where the cursor meets the curves: round on d_L, square on d_S."""
     a, b = _d_l(numbers.d_l_percent), _at(numbers.d_s_mm, d_s_top, D_S_TOP, D_S_BOTTOM)
-    circle = f'<circle cx="{x:.1f}" cy="{a:.1f}" r="4.5" fill="var(--fa-dl)"/>'
     square = (
         f'<rect x="{x - 4.2:.1f}" y="{b - 4.2:.1f}" width="8.4" height="8.4" fill="var(--fa-ds)"/>'
     )
     return (
-        f'<path d="{_upright(x, last)}" stroke="var(--fa-ink)" stroke-width="1.6"/>'
-        f"{circle if told else ''}{square if true else ''}"
+        f'<circle cx="{x:.1f}" cy="{a:.1f}" r="4.5" fill="var(--fa-dl)"/>{square if true else ""}'
     )

@@ -87,12 +87,14 @@ def html(
     """The report. pictures: of each outcome, by name; asked: what was run, for the head of the page."""
     style = asset_path("report.css").read_text(encoding="utf-8")
     digest = base64.b64encode(sha256(style.encode()).digest()).decode()
-    policy = f"default-src 'none'; img-src data:; style-src 'sha256-{digest}'; base-uri 'none'; form-action 'none'"
     parts = [_section(each, pictures.get(each.experiment.name, ())) for each in done]
     return "\n".join(
         (
             '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">',
-            f'<meta http-equiv="Content-Security-Policy" content="{policy}">',
+            (
+                f'<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; img-src data:; '
+                f"style-src 'sha256-{digest}'; base-uri 'none'; form-action 'none'\">"
+            ),
             '<meta name="viewport" content="width=device-width, initial-scale=1">',
             f"<title>{escape(say('report.title'))}</title>\n<style>{style}</style>\n</head>\n<body>\n<main>",
             f"<h1>{escape(say('report.title'))}</h1>",
@@ -107,7 +109,13 @@ def html(
 
 def verdict(claim: Claim) -> str:
     """Whether a claim holds, in words."""
-    return say(f"report.{VERDICTS[claim.holds]}")
+    match claim.holds:
+        case True:
+            return say("report.holds")
+        case False:
+            return say("report.fails")
+        case None:
+            return say("report.open")
 
 
 def shown(cell: Cell, decimals: int = 2) -> str:
@@ -136,7 +144,8 @@ def _summary(done: Sequence[Done]) -> str:
 
 
 def _claim_columns(*first: str) -> list[str]:
-    return [*first, *(say(f"report.{name}") for name in ("says", "paper", "ours", "verdict"))]
+    ours = say("report.says"), say("report.paper"), say("report.ours"), say("report.verdict")
+    return [*first, *ours]
 
 
 def _verdict_cell(claim: Claim) -> str:

@@ -86,7 +86,9 @@ color:var(--fa-dim);padding-top:4px}
 """
 
 _PLOTS = """
-.fa-plot{display:block;width:calc(100%*var(--fa-scale,1));height:auto;font-size:11.5px}.fa-plot text{fill:var(--fa-dim)}
+.fa-plot{display:block;width:calc(100%*var(--fa-scale,1));height:auto;font-size:11.5px}.fa-plot text{fill:var(--fa-dim);
+stroke:var(--mantine-color-body);stroke-width:4px;stroke-linejoin:round;paint-order:stroke}
+.fa-plot text.b{stroke:var(--fa-band)}
 .fa-plot .t{font-weight:650;font-size:12.5px}
 """
 

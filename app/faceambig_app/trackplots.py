@@ -39,28 +39,31 @@ def cursor_places(track: Track) -> tuple[Array, Array, Array]:
 
 
 def plots(track: Track, true_distance: float) -> str:
-    """The SVG; its cursor is the group of class "cursor", empty of places."""
+    """The SVG; its cursor is the path, the circle and the square of class "cursor", empty of places."""
     x, y_l, y_s = cursor_places(track)
     top = _d_s_axis(track)
     band = float(_height(np.array(HUMAN_TOLERANCE_PERCENT), D_L_MAX, D_L_TOP, D_L_BOTTOM))
     title_l, title_s = escape(say("plot.d_l")), escape(say("plot.d_s"))
     axis = say("player.axis_mode") if track.mode else say("plot.axis")
+    true_line, true_words = ("", "") if track.mode else _true_line(track, true_distance)
+    # Words above the upright lines, on a rim of the ground (player.css): no line crosses letters
     return "".join(
         (
             f'<svg class="plot" viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{title_l}, {title_s}">',
             f'<rect class="band" x="{LEFT}" y="{band:.1f}" width="{RIGHT - LEFT}" height="{D_L_BOTTOM - band:.1f}"/>',
             *(_grid(v, D_L_MAX, D_L_TOP, D_L_BOTTOM) for v in (0, 3, 6)),
             *(_grid(v, top, D_S_TOP, D_S_BOTTOM) for v in np.arange(0, top + 1, top / 3)),
+            true_line,
+            f'<g class="cursor"><path d="M0 {D_L_TOP}V{D_S_BOTTOM}"/></g>',
             f'<text class="name dl" x="2" y="14">{title_l}</text>',
             f'<text class="name ds" x="2" y="{D_S_TOP - 10}">{title_s}</text>',
-            f'<text x="{RIGHT - 3}" y="{band + 13:.1f}" text-anchor="end">{escape(say("plot.band"))}</text>',
+            f'<text class="on" x="{RIGHT - 3}" y="{band + 13:.1f}" text-anchor="end">{escape(say("plot.band"))}</text>',
             *_ticks(track),
             f'<text x="{(LEFT + RIGHT) / 2}" y="257" text-anchor="middle">{escape(axis)}</text>',
-            "" if track.mode else _true_line(track, true_distance),
+            true_words,
             f'<polyline class="line dl" points="{_line(x, y_l)}"/>',
             f'<polyline class="line ds" points="{_line(x, y_s)}"/>',
-            f'<g class="cursor"><path d="M0 {D_L_TOP}V{D_S_BOTTOM}"/>',
-            '<circle class="dl" r="4.5"/><rect class="ds" width="8.4" height="8.4"/></g></svg>',
+            '<g class="cursor"><circle class="dl" r="4.5"/><rect class="ds" width="8.4" height="8.4"/></g></svg>',
         )
     )
 
@@ -107,13 +110,14 @@ def _ticks(track: Track) -> list[str]:
     ]
 
 
-def _true_line(track: Track, metres: float) -> str:
+def _true_line(track: Track, metres: float) -> tuple[str, str]:
+    """The line of the true distance, and its words."""
     if not track.places[0] <= metres <= track.places[-1]:
-        return ""
+        return "", ""
     x = LEFT + float(_share(track, np.array(metres))) * (RIGHT - LEFT)
     anchor, shift = ("end", -4) if x > (LEFT + RIGHT) / 2 else ("start", 4)
     words = escape(say("plot.true", distance=centimetres(metres)))
     return (
-        f'<path class="true" d="M{x:.1f} {D_L_TOP}V{D_S_BOTTOM}"/>'
-        f'<text x="{x + shift:.1f}" y="{D_S_TOP + 10}" text-anchor="{anchor}">{words}</text>'
+        f'<path class="true" d="M{x:.1f} {D_L_TOP}V{D_S_BOTTOM}"/>',
+        f'<text x="{x + shift:.1f}" y="{D_S_TOP + 10}" text-anchor="{anchor}">{words}</text>',
     )

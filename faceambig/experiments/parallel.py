@@ -131,7 +131,7 @@ def _dask_client(settings: Settings, stack: ExitStack) -> Any:
         n_workers=settings.n_jobs if settings.n_jobs > 0 else cores,
         threads_per_worker=1,
         host="127.0.0.1",
-        dashboard_address=None,
+        dashboard_address="127.0.0.1:0",  # any free port: another cluster may run beside it
     )
     stack.enter_context(cluster)
     return stack.enter_context(distributed.Client(cluster))

@@ -10,10 +10,12 @@ from typing import Any
 
 from faceambig_app import server
 from faceambig_app.display import Display
+from faceambig_app.notices import cause
 from faceambig_app.text import say
 
 FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 SLIDER = "Assumed distance"
+BROKEN = ZeroDivisionError("the model is broken")
 
 
 def test_controls_are_said_again_after_a_frame_that_failed(monkeypatch):
@@ -23,7 +25,7 @@ def test_controls_are_said_again_after_a_frame_that_failed(monkeypatch):
     page = server.Page("127.0.0.1", 0)
 
     def fail(*_: object) -> None:
-        raise ZeroDivisionError("the model is broken")
+        raise BROKEN
 
     async def visit() -> None:
         async with opened(page.address) as tab:
@@ -33,7 +35,7 @@ def test_controls_are_said_again_after_a_frame_that_failed(monkeypatch):
             # As if an older value of the server had crossed ours: the server has 30, and no reason to say so
             control.value = None
             assert await tab.until(lambda: control.value == 30, 20.0)
-            assert tab.notices == [say("error.failed", cause="the model is broken")]
+            assert tab.notices == [say("error.failed", cause=cause(BROKEN))]
 
     try:
         asyncio.run(visit())

@@ -305,3 +305,22 @@ def test_no_label_crosses_another_or_leaves_the_plot(cm):
 def test_a_photograph_from_beyond_the_slider_has_no_line():
     html = figures.plots(curves(5.0), NUMBERS)
     assert "true:" not in text_of(html)
+
+
+@pytest.mark.parametrize("cm", [20, 60, 120, 300])
+def test_no_upright_line_crosses_letters(cm):
+    """Words come after the lines, on a rim of what is behind them; curves and marks after the words."""
+    assert ".fa-plot text{fill:var(--fa-dim);\nstroke:var(--mantine-color-body);" in figures.STYLE
+    assert "paint-order:stroke}\n.fa-plot text.b{stroke:var(--fa-band)}" in figures.STYLE
+    (svg,) = parsed(figures.plots(curves(), replace(NUMBERS, distance=cm / 100))).iter("svg")
+    order = list(svg)
+    words = [i for i, part in enumerate(order) if part.tag == "text"]
+    upright = [
+        i for i, part in enumerate(order) if re.fullmatch(r"(M\S+ \d+V\d+)+", part.get("d", ""))
+    ]
+    assert len(upright) == 2  # true distance and cursor
+    assert max(upright) < min(words)
+    curves_at = [i for i, part in enumerate(order) if part.tag in ("polyline", "circle", "rect")]
+    assert min(curves_at) > max(words)
+    on_band = [order[i].text for i in words if order[i].get("class") == "b"]
+    assert on_band == [say("plot.band")]

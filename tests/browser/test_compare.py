@@ -25,12 +25,6 @@ OPACITIES = """() => Object.fromEntries(["true", "fit"].map(name => { let found;
   return [name, found && [found.material.transparent, +found.material.opacity.toFixed(3)]] }))"""
 
 
-def goes(me: Visitor, **values: object) -> None:
-    me.do(lambda: me.browser.change(lambda state: changed(state, **values)))
-    me.until(lambda: me.state == changed(me.state, **values), str(values))
-    me.rest()
-
-
 def vertex_of(me: Visitor, name: str) -> tuple[int, float]:
     """A vertex in the middle of the face, seen from the front, and what its colour means."""
     nodes = me.browser.stage._heads[name]
@@ -66,7 +60,7 @@ def test_a_link_says_what_was_left_out_and_the_rest_of_it_counts(browser, served
 
 
 def test_a_pin_is_named_by_typing_and_its_name_is_in_row_table_and_link(me, visit, tmp_path):
-    goes(me, pins=(DEFAULT, changed(DEFAULT, distance=0.5)), view="front")
+    me.goes(pins=(DEFAULT, changed(DEFAULT, distance=0.5)), view="front")
     me.tab.get_by_role("tab", name="Compare", exact=True).click()
     field = me.tab.get_by_label("Name of pin 2", exact=True)
     field.click()
@@ -76,7 +70,7 @@ def test_a_pin_is_named_by_typing_and_its_name_is_in_row_table_and_link(me, visi
     me.rest()
     heads = me.tab.locator("table:has(caption) thead th")
     assert heads.all_inner_texts() == ["Pin 1", "N\u00e4her <b> \u05e9"]
-    goes(me, show="row")
+    me.goes(show="row")
     assert (
         me.browser.stage._heads["pin2"]._title.text == "N\u00e4her <b> \u05e9, assumed 50\u202fcm"
     )
@@ -97,7 +91,7 @@ def test_a_pin_is_named_by_typing_and_its_name_is_in_row_table_and_link(me, visi
 def test_one_head_of_an_overlay_is_solid_at_every_fade(me):
     for fade, true, fit in ((0.3, [True, 0.4], [False, 1]), (0.75, [False, 1], [False, 1]),
                             (0.9, [False, 1], [True, 0.4])):  # fmt: skip
-        goes(me, show="overlay", fade=fade)
+        me.goes(show="overlay", fade=fade)
         assert me.tab.evaluate(OPACITIES) == {"true": true, "fit": fit}, fade
 
 
@@ -105,7 +99,7 @@ def test_one_head_of_an_overlay_is_solid_at_every_fade(me):
 
 
 def test_a_mouse_that_rests_on_a_head_reads_its_millimetres_until_the_next_change(me, tmp_path):
-    goes(me, show="difference", view="front")
+    me.goes(show="difference", view="front")
     vertex, mm = vertex_of(me, "fit")
     x, y = me.tab.evaluate(AT, ["/fit/head", vertex])
     me.tab.mouse.move(x + 1, y + 1)
@@ -126,7 +120,7 @@ def test_a_mouse_that_rests_on_a_head_reads_its_millimetres_until_the_next_chang
 
 
 def test_the_skin_is_not_asked_and_a_press_that_turns_the_heads_is_no_click(me):
-    goes(me, view="front")
+    me.goes(view="front")
     asked = []
     heard, me.browser.script._heard = me.browser.script._heard, lambda report: asked.append(report)
     try:
@@ -140,6 +134,7 @@ def test_the_skin_is_not_asked_and_a_press_that_turns_the_heads_is_no_click(me):
 
 def test_a_finger_reads_by_a_tap(visit, tmp_path):
     you = visit(390, 844, query="show=difference&view=front", dpr=1, has_touch=True)
+    you.close_notices()
     vertex, mm = vertex_of(you, "fit")
     x, y = you.tab.evaluate(AT, ["/fit/head", vertex])
     you.tab.touchscreen.tap(x, y)

@@ -139,7 +139,9 @@ def test_points_are_found_dragged_and_the_photograph_is_gone_on_remove(visit, se
     privacy, button = words.bounding_box(), me.button("Photo").bounding_box()
     assert privacy["y"] + privacy["height"] <= button["y"]  # read before the button that sends it
     assert me.button("Find the points for me").count() == 0  # in what?
+    assert not me.tab.get_by_text("Points from a file").is_visible()
     me.upload(file)
+    me.see("Points from a file")
     me.press("Find the points for me")
     me.see("51 points found, without the jaw.")
     assert me.until(me.crosses, "no crosses") == 51
@@ -172,6 +174,22 @@ def test_points_are_found_dragged_and_the_photograph_is_gone_on_remove(visit, se
     me.until(lambda: me.numbers() and me.numbers()[0] > d_l, "d_L stays")
     me.press("Undo the last point")
     me.until(lambda: me.circles() == circles, "the drag is not taken back")
+
+    # by keys too, in the order in which things were done
+    before = photos(served)[0].points[48].tolist()
+    point.focus()
+    me.tab.keyboard.press("Shift+ArrowDown")
+    me.until(lambda: photos(served)[0].points[48].tolist() != before, "the key does not move it")
+    me.until(lambda: me.circles() != circles, "the circles do not follow the key")
+    me.tab.evaluate("() => document.activeElement.blur()")
+    me.tab.keyboard.press("j")
+    me.until(lambda: "distance=" in me.tab.url, "the distance stays")
+    me.tab.keyboard.press("Control+z")
+    me.until(lambda: "distance=" not in me.tab.url, "the distance is not taken back")
+    assert photos(served)[0].points[48].tolist() != before
+    me.tab.keyboard.press("Control+z")
+    me.until(lambda: photos(served)[0].points[48].tolist() == before, "the point is not taken back")
+    me.until(lambda: me.circles() == circles, "the circles do not go back")
     hint = me.button("Use the file's distance")  # told anew at rest
     me.until(lambda: hint.inner_text() == label, "the file's distance is still that of the drag")
     hint.click()

@@ -20,6 +20,12 @@ from faceambig_app.text import percent_number
 pytestmark = pytest.mark.browser
 STATE = ViewState(subject=3)
 DRAWN = "() => document.getElementById('heads').dataset.drawn"
+# Of either plot, pixels: where the curve is at the stop, and the middle of the cursor's mark
+MARKS = """() => ["dl", "ds"].map(kind => {
+  const plot = document.querySelector("[data-track=distance] .plot"), line = plot.querySelector(`.line.${kind}`);
+  const at = line.points[document.getElementById("slider").value].matrixTransform(line.getScreenCTM());
+  const box = plot.querySelector(`.cursor .${kind}`).getBoundingClientRect();
+  return [[at.x, at.y], [box.x + box.width / 2, box.y + box.height / 2]] })"""
 Open = Callable[..., Page]
 
 
@@ -87,6 +93,9 @@ def test_every_stop_shows_the_numbers_of_the_pipeline(opened: Open):
     for metres in track.places.tolist():
         state = changed(STATE, distance=metres)
         assert numbers(page) == expected(state, f"{100 * metres:g}\u202fcm")
+        for curve, mark in page.evaluate(MARKS):
+            # pixels: a curve is written to tenths of a unit, a cursor to four digits; both plots are 340 units wide
+            assert mark == pytest.approx(curve, abs=0.2)
         page.keyboard.press("ArrowRight")
     assert page.get_attribute("#slider", "aria-valuetext") == "300\u202fcm"
     page.wait_for_function(

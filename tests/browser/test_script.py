@@ -504,7 +504,14 @@ def test_nonsense_is_dropped_with_one_line(
     server: Tiny, page: Page, caplog: pytest.LogCaptureFixture
 ) -> None:
     uuid = server.script._data["report"]["uuid"]
-    for text in ("{", "[]", '{"gone": -1}', '{"point": {"index": 1}}', "x" * 5000, json.dumps({})):
+    for text in (
+        "{",
+        "[]",
+        '{"gone": -1}',
+        '{"point": {"index": 1}}',
+        "x" * (guard.MAX_REPORT + 1),
+        json.dumps({}),
+    ):
         page.evaluate(
             "([uuid, value]) => __viserMutable.sendMessage({ type: 'GuiUpdateMessage', uuid, updates: { value } })",
             [uuid, text],

@@ -28,7 +28,7 @@ class Limits:
     """What one browser, and all together, may take."""
 
     sessions: int = 64  # browsers at a time
-    first: float = 8.0  # seconds until a browser must have shown its camera
+    first: float = 30.0  # seconds until a browser shows its camera; a phone compiles shaders before
     idle: float = (
         3600.0  # seconds without a word; the page comes back by itself when it is looked at
     )

@@ -14,7 +14,7 @@ from ..text import centimetres, say
 from .widgets import Widgets
 
 PICTURES = ",".join(f"image/{kind}" for kind in ("png", "jpeg", "webp"))
-Button = viser.GuiButtonHandle | viser.GuiButtonGroupHandle | viser.GuiUploadButtonHandle
+Button = viser.GuiButtonHandle | viser.GuiButtonGroupHandle
 
 POINTS = ",".join((".pts", ".csv", ".txt", ".json"))
 HERE = "\0"  # where an element stands in words
@@ -55,6 +55,10 @@ class Data:
     of_asked: tuple[Button, ...]  # while a point is asked for
     more: viser.GuiButtonHandle
     undo: viser.GuiButtonHandle
+    points: viser.GuiUploadButtonHandle  # seen while there is a photograph
+    without: (
+        viser.GuiHtmlHandle
+    )  # a style that hides it: viser draws a button of uploads even if it is not visible
 
     def show(self, shown: Shown) -> None:
         """Write what is; on the event loop only."""
@@ -64,6 +68,10 @@ class Data:
             handle.visible = shown.photo
         for handle in self.of_asked:
             handle.visible = shown.asked
+        self.points.visible = (
+            shown.photo
+        )  # asked by the guard, which takes no file for what is not visible
+        self.without.content = "" if shown.photo else _hidden(self.points)
         self.more.visible, self.undo.visible = shown.more, shown.undo
         self.hint.visible = shown.hint is not None
         if shown.hint is not None:
@@ -83,6 +91,7 @@ def build(w: Widgets, does: Does, use_hint: Callable[[], None]) -> Data:
     points = add_upload(
         w.gui, say("own.points"), POINTS, does.read_points, hint=say("own.points_hint")
     )
+    without = w.gui.add_html("")
     undo = _button(w, "undo", does.undo)
     face = say("own.face")
     part = w.gui.add_button_group(say("own.part"), (face, say("own.whole")))
@@ -94,9 +103,14 @@ def build(w: Widgets, does: Does, use_hint: Callable[[], None]) -> Data:
     part.on_click(cut)
     hint = _button(w, "hint", use_hint)
     remove = _button(w, "remove", does.remove)
-    data = Data(status, hint, (find, begin, points, part, remove), (skip,), more, undo)
+    data = Data(status, hint, (find, begin, part, remove), (skip,), more, undo, points, without)
     data.show(Shown(photo=False))
     return data
+
+
+def _hidden(button: viser.GuiUploadButtonHandle) -> str:
+    """A style: the button's box and what it holds are not there."""
+    return f'<style>div:has(>[id="{button._impl.uuid}"]){{display:none}}</style>'
 
 
 def _button(w: Widgets, name: str, do: Callable[[], None]) -> viser.GuiButtonHandle:
