@@ -14,7 +14,7 @@ from .panel.lessons import Shown
 from .state import DEFAULT, ViewState, changed
 from .text import say
 
-OF_THE_READER = ("theme", "text")  # a step leaves them: they are about eyes
+OF_THE_READER = ("theme", "text", "lang")  # a step leaves them: they are about eyes
 Place = tuple[int, int]  # lesson and step
 
 
@@ -33,6 +33,10 @@ class LessonRoom:
         self._notice, self._show = notice, show
         self._said: dict[Place, str] = {}
         self._ticked: dict[Place, set[int]] = {}
+
+    def read(self, lessons: Lessons) -> None:
+        """The same lessons in another language; what was predicted and done stays."""
+        self._lessons = lessons
 
     @property
     def titles(self) -> Mapping[int, str]:

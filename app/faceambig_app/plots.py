@@ -16,7 +16,7 @@ from faceambig.arrays import Array
 from faceambig.scene import Curves, Numbers
 
 from .plottable import table
-from .text import NARROW, centimetres, percent_number, say
+from .text import NARROW, centimetres, each_language, numeral, percent_number, say
 
 WIDTH, LEFT, RIGHT = 340, 34, 290  # in SVG units; the distances end at RIGHT
 FAR, END = 322, 332  # of the far-away camera, which stands beyond all distances; of bands and grid
@@ -62,7 +62,7 @@ def _ticks_at(curves: Curves, told: bool) -> int:
     return BARS_AT[0] + 7 if told and curves.density is not None else D_S_BOTTOM
 
 
-@lru_cache(maxsize=KEPT)
+@each_language(maxsize=KEPT)
 def _ground(
     curves: Curves, reference: str, top: float, told: bool, true: bool, actual: bool
 ) -> str:
@@ -81,7 +81,7 @@ def _ground(
     return "".join(parts)
 
 
-@lru_cache(maxsize=KEPT)
+@each_language(maxsize=KEPT)
 def _said(curves: Curves, true: bool, with_table: bool) -> str:
     """The sentences below the plots, and the table."""
     below = [interval_words(curves), *([] if curves.density is None else [likely_words(curves)])]
@@ -165,7 +165,7 @@ def _alternative(curves: Curves, numbers: Numbers) -> str:
     return say(
         "plot.alt",
         d_l=f"{percent_number(least_l)} - {percent_number(most_l)}{NARROW}%",
-        d_s=f"{least_s:.1f} - {most_s:.1f}{NARROW}mm",
+        d_s=numeral(f"{least_s:.1f} - {most_s:.1f}{NARROW}mm"),
         now=centimetres(numbers.distance),
     )
 
@@ -264,7 +264,7 @@ def _grid(value: float, top_value: float, top: int, bottom: int) -> str:
     y = _at(value, top_value, top, bottom)
     return (
         f'<path d="M{LEFT} {y:.1f}H{END}" stroke="var(--fa-line)"/>'
-        f'<text x="{LEFT - 6}" y="{y + 4:.1f}" text-anchor="end">{value:g}</text>'
+        f'<text x="{LEFT - 6}" y="{y + 4:.1f}" text-anchor="end">{numeral(f"{value:g}")}</text>'
     )
 
 
