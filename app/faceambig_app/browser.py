@@ -94,7 +94,7 @@ class Browser:
             lessons(self.language), now=lambda: self.room.state, tell=self.change, notice=self._remark,
             show=lambda shown: self.panel.lesson.show(shown),
         )  # fmt: skip
-        self._build()
+        self._built = False  # the panel waits for the language that the page's script asks for
 
     def _build(self) -> None:
         """The panel and the commands, in the language that is spoken."""
@@ -116,12 +116,20 @@ class Browser:
         panel.places.style.content = style
         panel.show(self.room.state)
         self._command_palette()
+        self._built = True
 
     # ---------------------------------------------------------------- what a person does, on the loop
 
     def open(self) -> None:
         """Draw the first frame: of the state in the address, or of the default where no script tells."""
-        self._loop.call_later(HELLO, self.room.open)
+        self._loop.call_later(HELLO, self._begin)
+
+    def _begin(self) -> None:
+        if self.room.left:
+            return
+        if not self._built:
+            self._build()
+        self.room.open()
 
     def leave(self) -> None:
         """The browser has gone: compute nothing more for it."""
@@ -186,14 +194,13 @@ class Browser:
 
     def _arrive(self, to: history.History) -> None:
         before, self._history = self.room.state, to
+        if not self._built or self.language != language():
+            self._translate()
         self.room.go(to.now)
         self._read(before, to.now)
         if (before.theme, before.text) != (to.now.theme, to.now.text):
             self._dress()
             self.script.theme(cast(Theme, to.now.theme), to.now.text)
-        if self.language != language():
-            self.language = language()
-            self._translate()
         self.panel.show(to.now)
         self._lessons.watch(to.now)
 
@@ -201,14 +208,17 @@ class Browser:
         return self._asked if state.lang == AUTO else state.lang
 
     def _translate(self) -> None:
-        """Make all that has words anew: most controls cannot change theirs. State, history and photograph stay."""
+        """Make all that has words, or make it anew: most controls cannot change theirs. What is shown stays."""
+        self.language, again = language(), self._built
         self._lessons.read(lessons(self.language))
-        guard.clear(self._client.gui, keep=self.script.elements)
+        if again:
+            guard.clear(self._client.gui, keep=self.script.elements)
         self._build()
         self.script.words(words()["page"])
         self.script.language(self.language, words()["icon"])
-        self._show_own()
-        self.room.again()
+        if again:
+            self._show_own()
+            self.room.again()
 
     def _opened(self, state: ViewState) -> None:
         """A state came in a file."""
@@ -355,8 +365,13 @@ class Browser:
     def draw(self, state: ViewState, draft: bool) -> None:
         """Compute a state and send it; called by one worker at a time."""
         display = self._display  # read before the language: made anew after it
-        with speaking(self.language):
-            rest = display.draw(state, draft, self._own.photo)
+        with speaking(spoken := self.language):
+            try:
+                rest = display.draw(state, draft, self._own.photo)
+            except Exception:
+                if display is self._display and spoken == self.language:
+                    raise
+                return  # it drew for a panel that is no more; for the new one it is asked again
             if rest is not None:
                 self._loop.call_soon_threadsafe(self._settle, state, rest, display)
 

@@ -67,7 +67,7 @@ ALIKE = {
     "de": {
         "app.title", "photo.point", "stage.bar", "view.three_quarter", "flex.slider", "flex.mark_tolerance",
         "player.pause", "error_scale.1", "error_scale.5", "error_scale.10", "error_scale.20", "own.from_file",
-        "export.scale", "lang.en", "lang.de", "field.subject",
+        "export.scale", "panel.export", "lang.en", "lang.de", "field.subject",
     }
 }  # fmt: skip
 
