@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import logging
 import time
-from asyncio import AbstractEventLoop
+from asyncio import AbstractEventLoop, TimerHandle
 from typing import cast
 
 import viser
@@ -94,6 +94,7 @@ class Browser:
             lessons(self.language), now=lambda: self.room.state, tell=self.change, notice=self._remark,
             show=lambda shown: self.panel.lesson.show(shown),
         )  # fmt: skip
+        self._first: TimerHandle | None = None  # opens the page where no script says a word
         self._built = False  # the panel waits for the language that the page's script asks for
 
     def _build(self) -> None:
@@ -122,11 +123,9 @@ class Browser:
 
     def open(self) -> None:
         """Draw the first frame: of the state in the address, or of the default where no script tells."""
-        self._loop.call_later(HELLO, self._begin)
+        self._first = self._loop.call_later(HELLO, self._begin)
 
     def _begin(self) -> None:
-        if self.room.left:
-            return
         if not self._built:
             self._build()
         self.room.open()
@@ -134,6 +133,8 @@ class Browser:
     def leave(self) -> None:
         """The browser has gone: compute nothing more for it."""
         self.room.left = True
+        if self._first is not None:
+            self._first.cancel()  # it would hold all of this until its time
         self._own.leave()
         self._saving.leave()
         self._glide.stop()
