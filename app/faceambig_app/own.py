@@ -433,7 +433,7 @@ def _row(own: OwnPhoto, state: ViewState, subject: Subject) -> Scene:
     titles = [say("head.assumed", distance=centimetres(d)) for d in ROW_DISTANCES]
     captions = [
         (
-            (f"{say('number.d_l').lower()} {percent_number(face.d_l_percent)}\u202f%", "d_l"),
+            (f"{say('number.in_line_d_l')} {percent_number(face.d_l_percent)}\u202f%", "d_l"),
             (f"{say('own.difference')} {numeral(f'{face.d_s_mm:.1f}')}\u202fmm", "d_s"),
         )
         for face in faces

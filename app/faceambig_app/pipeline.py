@@ -22,7 +22,7 @@ from .likely import source, spread
 from .origin import origin
 from .scenes import scene_of
 from .state import Bend, Look, ViewState
-from .text import speaking
+from .text import drawn_words, speaking
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,7 +112,7 @@ def snapshot(
     )  # pyrender and OpenCV only when a picture is asked for
 
     with speaking(state.lang):
-        drawn = draw(frame(state).scene, width, height)
+        drawn = draw(frame(state).scene, width, height, words=drawn_words())
     if path is not None:
         write(Path(path), encode_png(drawn, origin(state, model(state.model))))
     return drawn

@@ -24,7 +24,7 @@ from faceambig.io.files import asset_path
 from faceambig.render.graph import draw_chart
 from faceambig.render.overlay import encode_png
 
-from .text import say
+from .text import language, say
 
 VERDICTS = {True: "holds", False: "fails", None: "open"}
 
@@ -91,7 +91,7 @@ def html(
     parts = [_section(each, pictures.get(each.experiment.name, ())) for each in done]
     return "\n".join(
         (
-            '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">',
+            f'<!doctype html>\n<html lang="{language()}">\n<head>\n<meta charset="utf-8">',
             f'<meta http-equiv="Content-Security-Policy" content="{policy}">',
             '<meta name="viewport" content="width=device-width, initial-scale=1">',
             f"<title>{escape(say('report.title'))}</title>\n<style>{style}</style>\n</head>\n<body>\n<main>",

@@ -178,8 +178,8 @@ def place_words(pin: ViewState) -> str:
 
 def _caption(shown: Face) -> tuple[tuple[str, str], ...]:
     return (
-        (f"{say('number.d_l').lower()} {percent_number(shown.d_l_percent)}\u202f%", "d_l"),
-        (f"{say('number.d_s').lower()} {numeral(f'{shown.d_s_mm:.1f}')}\u202fmm", "d_s"),
+        (f"{say('number.in_line_d_l')} {percent_number(shown.d_l_percent)}\u202f%", "d_l"),
+        (f"{say('number.in_line_d_s')} {numeral(f'{shown.d_s_mm:.1f}')}\u202fmm", "d_s"),
     )
 
 

@@ -24,7 +24,7 @@ from . import trackplots
 from .packing import TOLERANCE_MM
 from .provenance import provenance
 from .state import ViewState
-from .text import centimetres, distance_text, numeral, percent_number, say
+from .text import centimetres, distance_text, language, numeral, percent_number, say
 from .tracks import LETTERS, Track, label, place_text
 
 PHOTO_WIDTH, QUALITY = 560, 88
@@ -99,6 +99,7 @@ def _plots(state: ViewState, tracks: Sequence[Track]) -> str:
 def _words(state: ViewState) -> dict[str, str]:
     origin = provenance(state)
     return {
+        "lang": language(),
         "heading": say("app.heading"),
         "true": say("head.true"),
         "fit": say("head.fit"),

@@ -109,6 +109,11 @@ def numeral(digits: str) -> str:
     return digits.translate({ord("."): signs["decimal"], ord(","): signs["thousands"]})
 
 
+def drawn_words() -> dict[str, str]:
+    """What the library writes into a picture, for its `draw`."""
+    return words()["drawn"] | {"decimal": words()["app"]["decimal"]}
+
+
 def movement(english: str) -> str:
     """What a flexibility mode moves, as the library says it ("nose forward, ears back"), in the language.
 

@@ -17,6 +17,7 @@ import pytest
 
 import faceambig as fa
 from faceambig.errors import AssetError
+from faceambig.render.sheet import WORDS
 from faceambig.surface import DIRECTIONS, LANDMARK_GROUPS
 from faceambig_app import own, panel, text
 from faceambig_app.actions import ACTIONS
@@ -30,6 +31,7 @@ from faceambig_app.text import (
     accepted,
     centimetres,
     distance_text,
+    drawn_words,
     each_language,
     language,
     movement,
@@ -67,7 +69,7 @@ ALIKE = {
     "de": {
         "app.title", "photo.point", "stage.bar", "view.three_quarter", "flex.slider", "flex.mark_tolerance",
         "player.pause", "error_scale.1", "error_scale.5", "error_scale.10", "error_scale.20", "own.from_file",
-        "export.scale", "panel.export", "lang.en", "lang.de", "field.subject",
+        "drawn.bar", "export.scale", "panel.export", "lang.en", "lang.de", "field.subject",
     }
 }  # fmt: skip
 
@@ -141,8 +143,9 @@ def test_every_word_of_the_file_is_asked_for(recorded):
     reported = {
         f"report.{name}" for name in (*VERDICTS.values(), "says", "paper", "ours", "verdict")
     }
+    drawn = {f"drawn.{name}" for name in set(WORDS) - {"decimal"}}
     moved = {f"moves.{name}" for name in MOVED}
-    others = commands | points | signs | reported | moved
+    others = commands | points | signs | reported | moved | drawn
     assert KEYS - exact - recorded - scripted - others == set()
     assert (exact | recorded | others) - KEYS == set()
 
@@ -274,6 +277,13 @@ def test_a_number_alone_is_filled_in_with_the_decimal_sign_of_the_language():
             say("plot.true", distance="v. 1.5 a") == "wahr: v. 1.5 a"
         )  # no number: somebody's words
         assert numeral("9,201.5") == "9.201,5"
+
+
+def test_pictures_say_in_english_what_the_library_draws():
+    assert drawn_words() == WORDS
+    with speaking("de"):
+        assert drawn_words().keys() == WORDS.keys()
+        assert drawn_words()["decimal"] == ","
 
 
 def test_what_a_mode_moves_is_said_in_the_language():
