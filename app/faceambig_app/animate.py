@@ -18,6 +18,7 @@ from faceambig.arrays import Array
 from .export import without_own_photo
 from .provenance import file_name, notes, provenance, shown, who
 from .state import ViewState, changed
+from .text import drawn_words
 from .tracks import (
     FARTHEST,
     MOST_MM,
@@ -139,7 +140,7 @@ def drawn(
     for stop in range(len(track.places)):
         scene = scene_of(state, track, stop)
         scene = scene if own_photo else without_own_photo(scene)
-        frames.append(np.ascontiguousarray(draw(scene, *size)[..., :3]))
+        frames.append(np.ascontiguousarray(draw(scene, *size, words=drawn_words())[..., :3]))
         if progress is not None:
             progress(stop + 1, len(track.places))
     return frames

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import logging
 import time
-from asyncio import AbstractEventLoop
+from asyncio import AbstractEventLoop, TimerHandle
 from dataclasses import replace
 from typing import cast
 
@@ -50,7 +50,7 @@ from .script import (
 from .stage import Stage
 from .state import DEFAULT, ViewState, changed
 from .style import STYLE
-from .text import say
+from .text import AUTO, accepted, language, say, speaking, words
 
 log = logging.getLogger("faceambig")
 
@@ -83,13 +83,10 @@ class Browser:
         self._settled: ViewState | None = None  # the state drawn in full last
         self._greeted = False  # whether the page's script has told its address
         self._owned = False  # whether there is a photograph of this person
+        self.language = self._asked = language()  # spoken; what the browser asks for
         self.stage = Stage(client, self._orbited)
         self._dress()
         self.script = Script(client.gui, self.report)
-        people: dict[int | str, str] = {
-            index: subject.name for index, subject in enumerate(model(DEFAULT.model).subjects, 1)
-        }
-        people["photo"] = say("own.mine")
         self._own = OwnRoom(
             loop, self._own_changed, self.notice, steps=lambda: len(self._history.past)
         )
@@ -100,36 +97,58 @@ class Browser:
         self._saving = Saving(
             client, loop, orders, now=lambda: self.room.state, go=self._opened,
             show=lambda shown: self.panel.export.show(shown), notice=self.notice,
-            own=lambda: self._own.photo,
+            own=lambda: self._own.photo, language=lambda: self.language,
         )  # fmt: skip
         self._seat = None if classroom is None else Seat(
             classroom, may_lead=leads, go=self._followed, now=lambda: self.room.state,
             reveal=lambda place: self._lessons.reveal(place), show=self._show_class,
+            speaking=lambda: speaking(self.language),
         )  # fmt: skip
         self._lessons = LessonRoom(
-            lessons(), now=lambda: self.room.state, tell=self.change, notice=self._remark,
+            lessons(self.language), now=lambda: self.room.state, tell=self.change, notice=self._remark,
             show=lambda shown: self.panel.lesson.show(shown), of=self._seat,
         )  # fmt: skip
-        self.panel = Panel(
-            client.gui, people, self.change, self.act, narrow=self.stage.narrow,
+        self._invitation = invitation
+        self._first: TimerHandle | None = None  # opens the page where no script says a word
+        self._built = False  # the panel waits for the language that the page's script asks for
+
+    def _build(self) -> None:
+        """The panel and the commands, in the language that is spoken."""
+        people: dict[int | str, str] = {
+            index: subject.name for index, subject in enumerate(model(DEFAULT.model).subjects, 1)
+        }
+        people["photo"] = say("own.mine")
+        self.panel = panel = Panel(
+            self._client.gui, people, self.change, self.act, narrow=self.stage.narrow,
             own=self._own, use_hint=self._use_hint, saving=self._saving,
-            lessons_do=self._lessons, class_do=self._seat, invitation=invitation,
+            lessons_do=self._lessons, class_do=self._seat, invitation=self._invitation,
         )  # fmt: skip
-        self._display = Display(client, self.stage, self.panel, gone=lambda: self.room.left)
-        style = STYLE + figures.hidden_boxes(self.panel.widgets.step_sliders)
-        self.panel.places.style.content = style
-        self.panel.show(self.room.state)
+        # A worker may still be drawing for a panel that has been made anew
+        self._display = Display(
+            self._client, self.stage, panel,
+            gone=lambda: self.room.left or self.panel is not panel,
+        )  # fmt: skip
+        style = STYLE + figures.hidden_boxes(panel.widgets.step_sliders)
+        panel.places.style.content = style
+        panel.show(self.room.state)
         self._command_palette()
+        self._built = True
+        if self._seat is not None:
+            self._seat.show()
 
     # ---------------------------------------------------------------- what a person does, on the loop
 
     def open(self) -> None:
         """Draw the first frame: of the state in the address, or of the default where no script tells."""
-        self._loop.call_later(HELLO, self._unheard)
+        self._first = self._loop.call_later(HELLO, self._unheard)
 
     def _unheard(self) -> None:
         """Begin, with or without a word of the page's script."""
-        if self._seat is not None and not self._greeted and not self.room.left:
+        if self.room.left:
+            return
+        if not self._built:
+            self._build()
+        if self._seat is not None and not self._greeted:
             self._begin(self.room.state)
         self.room.open()
 
@@ -138,6 +157,8 @@ class Browser:
         self.room.left = True
         if self._seat is not None:
             self._seat.leave()
+        if self._first is not None:
+            self._first.cancel()  # it would hold all of this until its time
         self._own.leave()
         self._saving.leave()
         self._glide.stop()
@@ -198,7 +219,13 @@ class Browser:
 
         own: whether this person has gone there, and not the class.
         """
+        with speaking(self._language_of(to.now)):
+            self._arrive(to, own)
+
+    def _arrive(self, to: history.History, own: bool) -> None:
         before, self._history = self.room.state, to
+        if not self._built or self.language != language():
+            self._translate()
         self.room.go(to.now)
         self._read(before, to.now)
         if (before.theme, before.text) != (to.now.theme, to.now.text):
@@ -218,8 +245,24 @@ class Browser:
         )
 
     def _show_class(self, shown: Shown) -> None:
-        if self.panel.classroom is not None:
+        if self._built and self.panel.classroom is not None:
             self.panel.classroom.show(shown)
+
+    def _language_of(self, state: ViewState) -> str:
+        return self._asked if state.lang == AUTO else state.lang
+
+    def _translate(self) -> None:
+        """Make all that has words, or make it anew: most controls cannot change theirs. What is shown stays."""
+        self.language, again = language(), self._built
+        self._lessons.read(lessons(self.language))
+        if again:
+            guard.clear(self._client.gui, keep=self.script.elements)
+        self._build()
+        self.script.words(words()["page"])
+        self.script.language(self.language, words()["icon"])
+        if again:
+            self._show_own()
+            self.room.again()
 
     def _opened(self, state: ViewState) -> None:
         """A state came in a file."""
@@ -303,13 +346,18 @@ class Browser:
     def _hello(self, hello: Hello) -> None:
         """A browser has come, or come back: go where its address says."""
         self._still, self._dark = hello.reduced_motion, hello.dark
+        self._asked = accepted(hello.languages)
+        with speaking(self._language_of(from_query(hello.query)[0])):
+            self._come(hello)
+
+    def _come(self, hello: Hello) -> None:
         state, notices = from_query(hello.query)
         if hello.theme is not None and state.theme == DEFAULT.theme:
             state = changed(state, theme=hello.theme)
         if hello.text is not None and state.text == DEFAULT.text:
             state = changed(state, text=hello.text)
-        for words in notices:
-            self.notice(words)
+        for sentence in notices:
+            self.notice(sentence)
         if (
             self._seat is not None
             and self._seat.may_lead
@@ -368,20 +416,28 @@ class Browser:
     def refuse(self, error: BaseException) -> None:
         """Say why a state could not be drawn; the last good frame stays."""
         log.warning("a frame failed: %s", cause(error))
-        self.notice(say("error.failed", cause=cause(error)))
-        self._loop.call_soon_threadsafe(
-            self._loop.call_later, REST, self._say_again, self.room.state
-        )
+        with speaking(self.language):
+            self.notice(say("error.failed", cause=cause(error)))
+            self._loop.call_soon_threadsafe(
+                self._loop.call_later, REST, self._say_again, self.room.state
+            )
 
     def draw(self, state: ViewState, draft: bool) -> None:
         """Compute a state and send it; called by one worker at a time."""
-        rest = self._display.draw(state, draft, self._own.photo)
-        if rest is not None:
-            self._loop.call_soon_threadsafe(self._settle, state, rest)
+        display = self._display  # read before the language: made anew after it
+        with speaking(spoken := self.language):
+            try:
+                rest = display.draw(state, draft, self._own.photo)
+            except Exception:
+                if display is self._display and spoken == self.language:
+                    raise
+                return  # it drew for a panel that is no more; for the new one it is asked again
+            if rest is not None:
+                self._loop.call_soon_threadsafe(self._settle, state, rest, display)
 
-    def _settle(self, drawn: ViewState, rest: Rest) -> None:
+    def _settle(self, drawn: ViewState, rest: Rest, display: Display) -> None:
         """At rest, on the loop: what the controls show is what is, even where messages crossed on the way."""
-        if not self.room.left and self.room.state == drawn:
+        if display is self._display and not self.room.left and self.room.state == drawn:
             self._settled = drawn
             self._hint = rest.hint
             self._show_own()

@@ -16,6 +16,7 @@ from . import figures, photograph, pipeline, plots
 from .pipeline import Frame, frame, plots_of
 from .scenes import whole
 from .state import DEFAULT, ViewState, changed
+from .text import language
 from .told import Slider, flex_lines, pins_of, sliders_of, spectrum_of, told
 
 KEPT = 12  # states; each holds its heads, some megabytes
@@ -120,11 +121,12 @@ def drawn(state: ViewState, draft: bool, rested: ViewState | None) -> Drawn:
     state = _plain(state)
     if not draft:
         return _KEPT.get(
-            (state, None), lambda: Drawn(state, frame(state, with_curves=False), False)
+            (state, language(), None), lambda: Drawn(state, frame(state, with_curves=False), False)
         )
     before = None if rested is None or not _asks(state) else _plain(rested)
     return _KEPT.get(
-        (state, before, "draft"), lambda: Drawn(state, pipeline.draft(state, before), True)
+        (state, language(), before, "draft"),
+        lambda: Drawn(state, pipeline.draft(state, before), True),
     )
 
 

@@ -30,6 +30,7 @@ from .forms import to_json
 from .provenance import file_name, notes, provenance, shown
 from .scenes import pin_face
 from .state import DEFAULT, Fitting, Target, ViewState, changed
+from .text import drawn_words
 
 SCALES = (1, 2, 4)  # of a picture
 FACES = ("fit", "true")  # of a mesh
@@ -114,7 +115,14 @@ def picture_of(
     from faceambig.render.overlay import draw, encode_png
 
     step = None if progress is None else _counted(scene, progress)
-    rgba = draw(scene, scale=scale, transparent=transparent, overlays=overlays, step=step)
+    rgba = draw(
+        scene,
+        scale=scale,
+        transparent=transparent,
+        overlays=overlays,
+        words=drawn_words(),
+        step=step,
+    )
     if progress is not None:
         progress(1, 1)
     return file_name(shown(state), "png"), encode_png(rgba, provenance(state))

@@ -21,6 +21,7 @@ Kind = Literal[
 # Which cached step of the pipeline a field is a key of; "page": of none, it is the browser's alone
 Part = Literal["target", "fitting", "bend", "look", "page"]
 
+LANGUAGES = ("en", "de")  # each a file of words, assets/text/, and a folder of lessons
 MODES = 3  # flexibility modes bent at once
 LAST_MODE = 100
 PINS = 5
@@ -138,6 +139,7 @@ _ROWS = (
         choices=("auto", "light", "dark"), view=True,
     ),
     Field("text", "number", "page", "size of letters", 1, 2, step=0.25, view=True),
+    Field("lang", "choice", "page", "language of the words", choices=("auto", *LANGUAGES), view=True),
 )  # fmt: skip
 FIELDS: Mapping[str, Field] = {field.name: field for field in _ROWS}
 

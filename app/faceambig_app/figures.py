@@ -22,7 +22,7 @@ from .plots import interval_words as interval_words
 from .plots import plots as plots
 from .style import STYLE as STYLE
 from .style import text_size as text_size
-from .text import NARROW, distance_text, percent_number, say
+from .text import NARROW, distance_text, numeral, percent_number, say
 
 
 def hidden_boxes(uuids: Iterable[str]) -> str:
@@ -50,7 +50,7 @@ def cards(numbers: Numbers, *, hide: Collection[str] = ()) -> str:
     elif not numbers.plausible:
         warning = say("number.implausible")
     warned = f'<p class="fa-warn">{escape(warning)}</p>' if warning else ""
-    d_l, d_s = percent_number(numbers.d_l_percent), f"{abs(numbers.d_s_mm):.1f}"
+    d_l, d_s = percent_number(numbers.d_l_percent), numeral(f"{abs(numbers.d_s_mm):.1f}")
     title, note = say("number.d_s"), say("number.d_s_note")
     if numbers.reference:
         title, note = say("number.d_s_to", reference=numbers.reference), say("number.d_s_to_note")
@@ -164,14 +164,14 @@ def _over(words: str, colour: NDArray[np.uint8]) -> str:
 
 
 def _signed(value: float) -> str:
-    return f"{value:g}".replace("-", "\u2212")
+    return numeral(f"{value:g}").replace("-", "\u2212")
 
 
 def spectrum(values_mm: Array, words: Sequence[str]) -> str:
     """How far each flexibility mode moves the surface, millimetres at 1 % landmark change: values_mm (K,), words K."""
     largest = max((float(value) for value in values_mm), default=0.0) or 1.0
     rows = "".join(
-        f"<li><span>{escape(text)}</span><span>{value:.1f}{NARROW}mm</span>"
+        f"<li><span>{escape(text)}</span><span>{numeral(f'{value:.1f}')}{NARROW}mm</span>"
         f'<i style="width:{100 * float(value) / largest:.1f}%"></i></li>'
         for value, text in zip(values_mm, words, strict=True)
     )
@@ -186,7 +186,8 @@ def pin_matrix(names: Sequence[str], d_s_mm: Array) -> str:
     rows = []
     for i, name in enumerate(called):
         cells = "".join(
-            f"<td>{'' if i == j else f'{d_s_mm[i, j]:.1f}'}</td>" for j in range(len(names))
+            f"<td>{'' if i == j else numeral(f'{d_s_mm[i, j]:.1f}')}</td>"
+            for j in range(len(names))
         )
         rows.append(f'<tr><th scope="row">{name}</th>{cells}</tr>')
     caption = escape(say("pins.matrix"))

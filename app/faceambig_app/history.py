@@ -16,7 +16,7 @@ STEPS = 100
 STEP_CLOSES = 0.4  # seconds after the last change
 VIEW = tuple(name for name, field in FIELDS.items() if field.view)
 NOT_VIEW = tuple(name for name, field in FIELDS.items() if not field.view)
-OF_THE_READER = ("theme", "text")  # a reset leaves them: they are about eyes, not faces
+OF_THE_READER = ("theme", "text", "lang")  # a reset leaves them: they are about eyes, not faces
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ def redo(history: History) -> History:
 
 
 def reset(history: History, start: ViewState = DEFAULT) -> History:
-    """Back to `start`, as a step of its own; colours of the page and size of letters stay."""
+    """Back to `start`, as a step of its own; colours of the page, size of letters and language stay."""
     kept = {name: getattr(history.now, name) for name in OF_THE_READER}
     state = changed(start, **kept)
     if _same(state, history.now):

@@ -8,9 +8,11 @@ from html import escape
 
 from markdown_it import MarkdownIt
 
+from .fields import LANGUAGES
 from .lessons import Lesson, Step
 from .link import query
-from .text import NARROW, say
+from .state import ViewState, changed
+from .text import NARROW, language, say
 
 ADDRESS = "http://127.0.0.1:8080/"  # of `faceambig serve`, in links of the teacher's sheet
 
@@ -96,9 +98,14 @@ def teacher_page(lesson: Lesson) -> str:
         "## " + say("teacher.steps"), "",
     ]  # fmt: skip
     for k, step in enumerate(lesson.steps, 1):
-        lines.append(f"{k}. [{step.title}]({ADDRESS}?{query(step.state)})")
+        lines.append(f"{k}. [{step.title}]({ADDRESS}?{query(_in_language(step.state))})")
         lines += [f"   - {line}" for line in _sheet(step)]
     return "\n".join([*lines, "", "## " + say("teacher.notes"), "", lesson.teacher, ""])
+
+
+def _in_language(state: ViewState) -> ViewState:
+    """A link of a sheet opens the page in the sheet's language, whatever the browser asks for."""
+    return state if language() == LANGUAGES[0] else changed(state, lang=language())
 
 
 def _sheet(step: Step) -> Iterator[str]:

@@ -15,7 +15,7 @@ from .panel.lessons import Shown
 from .state import DEFAULT, ViewState, changed
 from .text import say
 
-OF_THE_READER = ("theme", "text")  # a step leaves them: they are about eyes
+OF_THE_READER = ("theme", "text", "lang")  # a step leaves them: they are about eyes
 Place = tuple[int, int]  # lesson and step
 
 
@@ -50,6 +50,10 @@ class LessonRoom:
         self._said: dict[Place, str] = {}  # "": told without an answer
         self._held: dict[Place, str] = {}  # answers to what a class has not been told yet
         self._ticked: dict[Place, set[int]] = {}
+
+    def read(self, lessons: Lessons) -> None:
+        """The same lessons in another language; what was predicted and done stays."""
+        self._lessons = lessons
 
     @property
     def titles(self) -> Mapping[int, str]:

@@ -23,6 +23,7 @@ from . import link, measures
 from .conditions import Condition, condition
 from .fields import LAST_LESSON, LAST_STEP
 from .state import DEFAULT, ViewState, changed
+from .text import speaking
 
 log = logging.getLogger("faceambig")
 
@@ -112,7 +113,8 @@ class Lessons:
 def lessons(language: str = "en") -> Lessons:
     """The lessons of a language, with the numbers that tools/lessons.py has computed; problems are logged."""
     folder = asset_path(f"lessons/{language}")
-    found = read_lessons(folder, stored(folder.parent / NUMBERS))
+    with speaking(language):  # the numbers in them
+        found = read_lessons(folder, stored(folder.parent / NUMBERS))
     for problem in found.problems:
         log.warning("a lesson is left out: %s", problem)
     return found

@@ -28,7 +28,7 @@ from .faces import face
 from .fits import model, n_fitted
 from .likely import extremes, flex_modes, posterior, source
 from .state import ViewState, changed
-from .text import NARROW, distance_text, percent_number
+from .text import NARROW, distance_text, numeral, percent_number
 
 OVER: Mapping[str, Callable[[list[float]], float]] = {"mean": fmean, "max": max, "min": min}
 LEVEL = 0.95  # of the range of likely distances
@@ -151,7 +151,7 @@ def _whole_percent(number: float) -> str:
 
 
 def _mm(number: float) -> str:
-    return f"{abs(number):.1f}{NARROW}mm"
+    return numeral(f"{abs(number):.1f}{NARROW}mm")
 
 
 def _metres(number: float) -> str:
@@ -163,7 +163,8 @@ MEASURES: Mapping[str, Measure] = {
     "d_l": Measure(lambda state: _face(state).d_l_percent, _percent),
     "d_s": Measure(lambda state: _face(state).d_s_mm, _mm),
     "points": Measure(
-        lambda state: n_fitted(state.target, state.fitting), lambda number: f"{number:,.0f}"
+        lambda state: n_fitted(state.target, state.fitting),
+        lambda number: numeral(f"{number:,.0f}"),
     ),
     # of the first flexibility mode with a slider: where plausible faces end
     "bend_end": Measure(lambda state: min(-_mode(state).low, _mode(state).high), _mm),

@@ -42,7 +42,7 @@ from .actions import ROW_DISTANCES
 from .fields import FIELDS, MODES
 from .fits import model
 from .state import DEFAULT, Fitting, ViewState
-from .text import centimetres, percent_number, say
+from .text import centimetres, movement, numeral, percent_number, say
 from .told import LETTERS
 
 REFERENCE = 0.6  # metres: of the fit that stands in for the true face
@@ -263,7 +263,7 @@ def _sliders(
     for letter, k in zip(LETTERS, range(first - 1, len(modes.words)), strict=False):
         low, high = FIELDS["flex"].low, FIELDS["flex"].high
         ends = tuple((round(mm, 2), "") for mm in modes.reach(k) if low <= mm <= high)
-        sliders.append((say("flex.slider", letter=letter, words=modes.words[k]), ends))
+        sliders.append((say("flex.slider", letter=letter, words=movement(modes.words[k])), ends))
     return tuple(sliders)
 
 
@@ -433,8 +433,8 @@ def _row(own: OwnPhoto, state: ViewState, subject: Subject) -> Scene:
     titles = [say("head.assumed", distance=centimetres(d)) for d in ROW_DISTANCES]
     captions = [
         (
-            (f"{say('number.d_l').lower()} {percent_number(face.d_l_percent)}\u202f%", "d_l"),
-            (f"{say('own.difference')} {face.d_s_mm:.1f}\u202fmm", "d_s"),
+            (f"{say('number.in_line_d_l')} {percent_number(face.d_l_percent)}\u202f%", "d_l"),
+            (f"{say('own.difference')} {numeral(f'{face.d_s_mm:.1f}')}\u202fmm", "d_s"),
         )
         for face in faces
     ]

@@ -109,7 +109,7 @@ class OwnRoom:
         while self._todo is not None:
             (job, make, done), self._todo = self._todo, None
             try:
-                made = await self._loop.run_in_executor(None, make, self.photo)
+                made = await asyncio.to_thread(make, self.photo)  # in the same language
             except Exception as error:  # noqa: BLE001 - a stranger's file; the browser goes on, and is told
                 if job == self._job:
                     self.status = str(error)

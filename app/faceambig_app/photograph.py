@@ -9,7 +9,6 @@ from __future__ import annotations
 import base64
 import math
 from dataclasses import replace
-from functools import lru_cache
 from html import escape
 
 import numpy as np
@@ -17,7 +16,7 @@ import numpy as np
 from faceambig.arrays import Array, IntArray
 from faceambig.scene import Photo
 
-from .text import NARROW, say
+from .text import NARROW, each_language, numeral, say
 
 CROSS, CIRCLE = 3.6, 4.6  # half sizes in pixels of a picture of 500
 RED, BLUE, INK = "#C8102E", "#1B5FC1", "#1D2733"  # on the photograph, in both themes
@@ -152,14 +151,14 @@ def _hover(photo: Photo, landmarks: IntArray | None) -> str:
         x, y = photo.observed[index].tolist()
         if math.isfinite(x + y):
             before, after = _gap_words(_name(photo, index))
-            mm = f"{gap:.1f}" if math.isfinite(gap) else "?"
+            mm = numeral(f"{gap:.1f}") if math.isfinite(gap) else "?"
             parts.append(
                 f'<path class="fa-hit" d="M{x:.1f} {y:.1f}h.01"><title>{before}{mm}{after}</title></path>'
             )
     return "".join(parts)
 
 
-@lru_cache(maxsize=512)
+@each_language(maxsize=512)
 def _gap_words(name: str) -> tuple[str, str]:
     """What stands before and after the millimetres of a point, escaped; a class asks for 68 of them many times."""
     before, _, after = escape(say("photo.gap", name=name, mm="\0")).partition("\0")
@@ -222,11 +221,14 @@ def _alternative(photo: Photo, landmarks: IntArray | None) -> str:
     if not photo.points_shown or not len(gaps):
         return say("photo.alt_plain", caption=photo.caption)
     return say(
-        "photo.alt", caption=photo.caption, points=len(gaps), mm=f"{gaps.mean():.1f}{NARROW}mm"
+        "photo.alt",
+        caption=photo.caption,
+        points=len(gaps),
+        mm=numeral(f"{gaps.mean():.1f}{NARROW}mm"),
     )
 
 
-@lru_cache(maxsize=1)
+@each_language(maxsize=4)
 def _key() -> str:
     cross, circle = (
         _sign(_cross(6, 6, 4), "seen"),

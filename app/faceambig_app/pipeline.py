@@ -22,6 +22,7 @@ from .likely import source, spread
 from .origin import origin
 from .scenes import scene_of
 from .state import Bend, Look, ViewState
+from .text import drawn_words, speaking
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,7 +111,8 @@ def snapshot(
         encode_png,
     )  # pyrender and OpenCV only when a picture is asked for
 
-    drawn = draw(frame(state).scene, width, height)
+    with speaking(state.lang):
+        drawn = draw(frame(state).scene, width, height, words=drawn_words())
     if path is not None:
         write(Path(path), encode_png(drawn, origin(state, model(state.model))))
     return drawn

@@ -31,7 +31,7 @@ from .packing import directions, packed, rounded, step_of
 from .provenance import file_name, shown, who
 from .standalone import CIRCLE, html
 from .state import ViewState, changed
-from .text import distance_text, percent_number, say
+from .text import distance_text, numeral, percent_number, say
 from .tracks import (
     FARTHEST,
     LETTERS,
@@ -184,7 +184,7 @@ def described_track(state: ViewState, track: Track, weights: Array) -> dict[str,
 def stop_words(track: Track, stop: int) -> dict[str, Any]:
     """What is shown and said at a stop: the same numbers, written the same way, as on the page."""
     face, text = track.faces[stop], place_text(track, stop)
-    d_l, d_s = percent_number(face.d_l_percent), f"{face.d_s_mm:.1f}"
+    d_l, d_s = percent_number(face.d_l_percent), numeral(f"{face.d_s_mm:.1f}")
     warning = ""
     if not face.fit.converged:
         warning = say("number.not_converged")

@@ -17,7 +17,7 @@ from faceambig.arrays import Array
 from faceambig.scene import Curves, Numbers
 
 from .plottable import table
-from .text import NARROW, centimetres, percent_number, say
+from .text import NARROW, centimetres, each_language, numeral, percent_number, say
 
 WIDTH, LEFT, RIGHT = 340, 34, 290  # in SVG units; the distances end at RIGHT
 FAR, END = 322, 332  # of the far-away camera, which stands beyond all distances; of bands and grid
@@ -67,7 +67,7 @@ def _ticks_at(curves: Curves, told: bool) -> int:
     return BARS_AT[0] + 7 if told and curves.density is not None else D_S_BOTTOM
 
 
-@lru_cache(maxsize=KEPT)
+@each_language(maxsize=KEPT)
 def _still(
     curves: Curves, reference: str, top: float, told: bool, true: bool, actual: bool
 ) -> tuple[str, str]:
@@ -92,7 +92,7 @@ def _still(
     return "".join(plot.ground for plot in shown) + true_line, "".join(words + lines)
 
 
-@lru_cache(maxsize=KEPT)
+@each_language(maxsize=KEPT)
 def _said(curves: Curves, true: bool, with_table: bool) -> str:
     """The sentences below the plots, and the table."""
     below = [interval_words(curves), *([] if curves.density is None else [likely_words(curves)])]
@@ -176,7 +176,7 @@ def _alternative(curves: Curves, numbers: Numbers) -> str:
     return say(
         "plot.alt",
         d_l=f"{percent_number(least_l)} - {percent_number(most_l)}{NARROW}%",
-        d_s=f"{least_s:.1f} - {most_s:.1f}{NARROW}mm",
+        d_s=numeral(f"{least_s:.1f} - {most_s:.1f}{NARROW}mm"),
         now=centimetres(numbers.distance),
     )
 
@@ -284,9 +284,9 @@ def _grid(values: Iterable[float], top_value: float, top: int, bottom: int) -> t
     """Lines across, and their values."""
     lines, words = "", ""
     for value in values:
-        y = _at(value, top_value, top, bottom)
+        y, shown = _at(value, top_value, top, bottom), numeral(f"{value:g}")
         lines += f'<path d="M{LEFT} {y:.1f}H{END}" stroke="var(--fa-line)"/>'
-        words += f'<text x="{LEFT - 6}" y="{y + 4:.1f}" text-anchor="end">{value:g}</text>'
+        words += f'<text x="{LEFT - 6}" y="{y + 4:.1f}" text-anchor="end">{shown}</text>'
     return lines, words
 
 

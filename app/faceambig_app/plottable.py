@@ -8,7 +8,7 @@ import numpy as np
 
 from faceambig.scene import Curves
 
-from .text import percent_number, say
+from .text import numeral, percent_number, say
 
 MOST_ROWS = 25  # distances; the far-away camera has a row of its own
 
@@ -25,7 +25,7 @@ def table(curves: Curves, true: bool = True) -> str:
     for row in rows:
         cells = [percent_number(float(curves.d_l_percent[row]))]
         if true:
-            cells.append(f"{curves.d_s_mm[row]:.1f}")
+            cells.append(numeral(f"{curves.d_s_mm[row]:.1f}"))
         if likely is not None:
             cells.append(f"{100 * likely[row]:.0f}")
         numbers = "".join(f"<td>{cell}</td>" for cell in cells)
@@ -41,7 +41,7 @@ def table(curves: Curves, true: bool = True) -> str:
 def _far_row(curves: Curves, true: bool) -> str:
     """The last row: the far-away camera, which is no distance that could be likely."""
     d_l, d_s = curves.orthographic
-    cells = [percent_number(d_l), *([f"{d_s:.1f}"] if true else [])]
+    cells = [percent_number(d_l), *([numeral(f"{d_s:.1f}")] if true else [])]
     cells += [""] if curves.density is not None else []
     numbers = "".join(f"<td>{cell}</td>" for cell in cells)
     return f'<tr><th scope="row">{escape(say("plot.far"))}</th>{numbers}</tr>'

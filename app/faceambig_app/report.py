@@ -24,7 +24,7 @@ from faceambig.io.files import asset_path
 from faceambig.render.graph import draw_chart
 from faceambig.render.overlay import encode_png
 
-from .text import say
+from .text import language, say
 
 VERDICTS = {True: "holds", False: "fails", None: "open"}
 
@@ -90,7 +90,7 @@ def html(
     parts = [_section(each, pictures.get(each.experiment.name, ())) for each in done]
     return "\n".join(
         (
-            '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">',
+            f'<!doctype html>\n<html lang="{language()}">\n<head>\n<meta charset="utf-8">',
             (
                 f'<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; img-src data:; '
                 f"style-src 'sha256-{digest}'; base-uri 'none'; form-action 'none'\">"

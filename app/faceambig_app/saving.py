@@ -19,7 +19,7 @@ from .orders import Orders, Progress, Work
 from .own import OwnPhoto
 from .panel.export import Shown
 from .state import ViewState
-from .text import NARROW, say
+from .text import NARROW, language, numeral, say, speaking
 
 log = logging.getLogger("faceambig")
 
@@ -38,8 +38,9 @@ class Saving:
         show: Callable[[Shown], None],
         notice: Callable[[str], None],
         own: Callable[[], OwnPhoto | None] = lambda: None,
+        language: Callable[[], str] = language,
     ) -> None:
-        self._own = own
+        self._own, self._language = own, language
         self._client, self._loop, self._orders = client, loop, orders
         self._now, self._go, self._show, self._notice = now, go, show, notice
         self._left = False
@@ -51,8 +52,7 @@ class Saving:
     def save(self, kind: str, **options: Any) -> None:
         """Order the state, as it is now, as a file."""
         state = self._now()
-        work = self._work(state, kind, options)
-
+        work = _spoken(self._language(), self._work(state, kind, options))
         if not self._orders.take(self, work):
             self._notice(say("export.busy"))
 
@@ -99,28 +99,31 @@ class Saving:
 
     def waits(self, before: int) -> None:
         """Another's file is made first, or this one is begun."""
-        words = say("export.begins")
-        if before:
-            words = say("export.waits", count=before)
-        self._tell(Shown(words, busy=True))
+        with speaking(self._language()):
+            words = say("export.waits", count=before) if before else say("export.begins")
+            self._tell(Shown(words, busy=True))
 
     def goes_on(self, done: int, of: int) -> None:
         """So many parts of it are done."""
-        if done < of:
-            words = say("export.goes_on", done=done + 1, of=of)
-        else:
-            words = say("export.writing")
-        self._tell(Shown(words, done / of, busy=True))
+        with speaking(self._language()):
+            if done < of:
+                words = say("export.goes_on", done=done + 1, of=of)
+            else:
+                words = say("export.writing")
+            self._tell(Shown(words, done / of, busy=True))
 
     def made(self, name: str, data: bytes) -> None:
         """Send it."""
         if send_file(self._client, name, data, lambda: self._left):
-            self._tell(Shown(say("export.saved", name=name, size=size_text(len(data)))))
+            with speaking(self._language()):
+                self._tell(Shown(say("export.saved", name=name, size=size_text(len(data)))))
 
     def failed(self, error: Exception) -> None:
         """Say why there is no file."""
         log.warning("an export failed: %s", cause(error))
-        self._tell(Shown(), partial(self._notice, say("export.failed", cause=cause(error))))
+        with speaking(self._language()):
+            words = say("export.failed", cause=cause(error))
+            self._tell(Shown(), partial(self._notice, words))
 
     def _tell(self, shown: Shown, also: Callable[[], None] | None = None) -> None:
         number = self._number
@@ -151,8 +154,18 @@ class Saving:
             self._note = None  # closes itself
 
 
+def _spoken(language: str, work: Work) -> Work:
+    """The same work in a thread that speaks another language."""
+
+    def speaks(progress: Progress) -> tuple[str, bytes]:
+        with speaking(language):
+            return work(progress)
+
+    return speaks
+
+
 def size_text(n_bytes: int) -> str:
     """12 kB, 1.4 MB."""
     if n_bytes < 1e6:
         return f"{max(1, round(n_bytes / 1e3))}{NARROW}kB"
-    return f"{n_bytes / 1e6:.1f}{NARROW}MB"
+    return numeral(f"{n_bytes / 1e6:.1f}{NARROW}MB")

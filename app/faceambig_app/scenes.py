@@ -26,7 +26,7 @@ from .actions import ROW_DISTANCES
 from .faces import face
 from .fits import n_fitted, photograph
 from .state import DEFAULT, Bend, Look, Target, ViewState, names_of_pins
-from .text import centimetres, distance_text, percent_number, say
+from .text import centimetres, distance_text, each_language, numeral, percent_number, say
 
 PHOTO_FULL, PHOTO_DRAFT = 560, 200  # pixels wide, of the page's photograph
 
@@ -178,12 +178,12 @@ def place_words(pin: ViewState) -> str:
 
 def _caption(shown: Face) -> tuple[tuple[str, str], ...]:
     return (
-        (f"{say('number.d_l').lower()} {percent_number(shown.d_l_percent)}\u202f%", "d_l"),
-        (f"{say('number.d_s').lower()} {shown.d_s_mm:.1f}\u202fmm", "d_s"),
+        (f"{say('number.in_line_d_l')} {percent_number(shown.d_l_percent)}\u202f%", "d_l"),
+        (f"{say('number.in_line_d_s')} {numeral(f'{shown.d_s_mm:.1f}')}\u202fmm", "d_s"),
     )
 
 
-@lru_cache(maxsize=64)
+@each_language(maxsize=64)
 def picture(target: Target) -> Photo:
     """The photograph of a target, without a fit's points."""
     taken = photograph(target)

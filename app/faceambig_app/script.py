@@ -32,6 +32,8 @@ class Hello(Struct, frozen=True):
     dark: bool  # the system's preference
     theme: Theme | None  # kept in this browser; None: never chosen
     text: Annotated[float, Meta(ge=1, le=2)] | None  # size of text, likewise
+    # of the browser, dearest first
+    languages: Annotated[tuple[Annotated[str, Meta(max_length=40)], ...], Meta(max_length=8)] = ()
 
 
 class Point(Struct, frozen=True):
@@ -138,9 +140,9 @@ class Script:
         self._lock = threading.Lock()
         self._copies = 0
         self._data: dict[str, object] = {}
-        control = add_reports(gui, self._take)
+        self._control = add_reports(gui, self._take)
         self._html = gui.add_html("")
-        self._send("report", {"uuid": control._impl.uuid})
+        self._send("report", {"uuid": self._control._impl.uuid})
 
     def address(self, query: str) -> None:
         """What the address bar shows after "/?"; viser's own harmless keys stay. No new entry of the history."""
@@ -200,6 +202,16 @@ class Script:
     def words(self, words: dict[str, str]) -> None:
         """Section "page" of another language."""
         self._send("words", words)
+
+    def language(self, language: str, icons: dict[str, str]) -> None:
+        """The language of the page, for screen readers and spelling; names of the buttons with viser's icons."""
+        self._send("lang", language)
+        self._send("icons", icons)
+
+    @property
+    def elements(self) -> tuple[str, ...]:
+        """Identifiers of its own elements, which stay when a panel is made anew."""
+        return self._control._impl.uuid, self._html._impl.uuid
 
     def _send(self, kind: str, value: object) -> None:
         # All in one element: what is sent within one frame is merged, and nothing must be lost

@@ -33,7 +33,7 @@ from .pipeline import frame
 from .room import Dispatcher
 from .stage import FAR, FIRST_FOV, FIRST_POSITION, NEAR
 from .state import DEFAULT
-from .text import say
+from .text import AUTO, say
 
 CLOSED = re.compile("Queued a .* on a closed connection")  # a warning of viser
 
@@ -57,7 +57,9 @@ class Page:
         lessons()
         self._dispatcher, self._orders = Dispatcher(), Orders()
         self._browsers: dict[int, Browser] = {}
-        hooks = guard.Hooks(words=refusal, on_refused=self._refused, on_error=self._failed)
+        hooks = guard.Hooks(
+            words=refusal, on_refused=self._refused, on_error=self._failed, language=self._language
+        )
         self._server = guard.start(
             host,
             port,
@@ -104,6 +106,10 @@ class Page:
         browser = self._browsers.get(-1 if client_id is None else client_id)
         if browser is not None:
             browser.refuse(error)
+
+    def _language(self, client_id: int) -> str:
+        browser = self._browsers.get(client_id)
+        return AUTO if browser is None else browser.language
 
     def _refused(self, client_id: int, words: str) -> None:
         browser = self._browsers.get(client_id)

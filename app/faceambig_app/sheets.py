@@ -18,7 +18,7 @@ from faceambig.render.overlay import GROUND, draw
 from faceambig.render.plots import DIM, INK
 from faceambig.scene import Curves, Head, Legend, Numbers, Photo, Scene
 
-from .text import centimetres, percent_number, say
+from .text import centimetres, drawn_words, percent_number, say
 
 Pixels = NDArray[np.uint8]
 Reference = Literal["true", "best", "saved"]  # the face that those of a sweep are compared with
@@ -69,7 +69,7 @@ def faces_sheet(fit: fa.Fit, faces: Sequence[Bent], note: str) -> Pixels:
             )
         )  # fmt: skip
     scene = _scene(fit, heads, _legend(say("sheet.legend"), most, model.evaluation is None), note)
-    return draw(scene, max(1600, CELL * len(heads) + 200), 760)
+    return draw(scene, max(1600, CELL * len(heads) + 200), 760, words=drawn_words())
 
 
 def mode_face(number: int, mm: float, alpha: Array, d_l_percent: float, plausible: bool) -> Bent:

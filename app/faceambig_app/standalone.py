@@ -24,7 +24,7 @@ from . import trackplots
 from .packing import TOLERANCE_MM
 from .provenance import provenance
 from .state import ViewState
-from .text import centimetres, distance_text, percent_number, say
+from .text import centimetres, distance_text, language, numeral, percent_number, say
 from .tracks import LETTERS, Track, label, place_text
 
 PHOTO_WIDTH, QUALITY = 560, 88
@@ -99,6 +99,7 @@ def _plots(state: ViewState, tracks: Sequence[Track]) -> str:
 def _words(state: ViewState) -> dict[str, str]:
     origin = provenance(state)
     return {
+        "lang": language(),
         "heading": say("app.heading"),
         "true": say("head.true"),
         "fit": say("head.fit"),
@@ -191,7 +192,7 @@ def table(track: Track) -> str:
     )
     rows = "".join(
         f"<tr><td>{place_text(track, stop)}</td><td>{percent_number(face.d_l_percent)}</td>"
-        f"<td>{face.d_s_mm:.1f}</td></tr>"
+        f"<td>{numeral(f'{face.d_s_mm:.1f}')}</td></tr>"
         for stop, face in enumerate(track.faces)
     )
     name = escape(label(track))

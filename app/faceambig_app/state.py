@@ -117,6 +117,7 @@ class ViewState(
     step: int = 1
     theme: str = "auto"
     text: float = 1.0
+    lang: str = "auto"  # as the browser asks; English where there is none
 
     def __post_init__(self) -> None:
         if isinstance(self.v, bool) or self.v != VERSION:

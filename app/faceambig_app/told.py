@@ -16,7 +16,7 @@ from .fits import photograph
 from .likely import FlexMode, extremes, flex_modes, posterior, source
 from .scenes import fit_title, pin_names, place_words
 from .state import Bend, Fitting, Look, Target, ViewState
-from .text import centimetres, percent_number, say
+from .text import centimetres, movement, percent_number, say
 
 SPECTRUM = 10  # flexibility modes shown as bars
 LETTERS = ("A", "B", "C")  # of the sliders
@@ -46,7 +46,7 @@ def sliders_of(state: ViewState) -> list[Slider]:
     """Label and marks of the sliders of flexibility modes: what a person cannot tell, where plausible faces end."""
     window = flex_of(state)[state.flex_from - 1 : state.flex_from + MODES - 1]
     return [
-        (say("flex.slider", letter=letter, words=mode.words), _marks(mode))
+        (say("flex.slider", letter=letter, words=movement(mode.words)), _marks(mode))
         for letter, mode in zip(LETTERS, window, strict=False)
     ]
 
@@ -60,7 +60,7 @@ def flex_lines(state: ViewState) -> list[str]:
             "flex.words",
             letter=letter,
             number=mode.number,
-            words=mode.words,
+            words=movement(mode.words),
             low=f"{mode.low:.1f}".replace("-", "\u2212"),
             high=f"{mode.high:.1f}",
             percent=percent_number(10.0 * HUMAN_TOLERANCE_PERCENT / mode.tolerance_mm),
@@ -69,7 +69,7 @@ def flex_lines(state: ViewState) -> list[str]:
     ]
     for number, mm in bent.items():
         if not first <= number < first + MODES:
-            words = modes[number - 1].words
+            words = movement(modes[number - 1].words)
             lines.append(say("flex.elsewhere", number=number, words=words, mm=f"{mm:g}"))
     return lines
 
@@ -98,7 +98,7 @@ def spectrum_of(state: ViewState) -> tuple[Array, list[str]]:
     """
     modes = flex_of(state)[:SPECTRUM]
     reach = [min(mode.tolerance_mm / HUMAN_TOLERANCE_PERCENT, mode.high) for mode in modes]
-    return np.array(reach), [mode.words for mode in modes]
+    return np.array(reach), [movement(mode.words) for mode in modes]
 
 
 @lru_cache(maxsize=256)

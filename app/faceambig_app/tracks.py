@@ -19,7 +19,7 @@ from faceambig.scene import Scene
 from . import likely, pipeline
 from .faces import face
 from .state import FIELDS, ViewState, changed
-from .text import NARROW, centimetres, say
+from .text import NARROW, centimetres, movement, numeral, say
 
 MODES = 3  # flexibility modes on offer: A, B, C
 SWING_MM, MOST_MM = (
@@ -97,7 +97,7 @@ def label(track: Track) -> str:
     """What moves, in words."""
     if not track.mode:
         return say("player.distance")
-    return say("player.mode_label", letter=LETTERS[track.mode - 1], words=track.words)
+    return say("player.mode_label", letter=LETTERS[track.mode - 1], words=movement(track.words))
 
 
 def place_text(track: Track, stop: int) -> str:
@@ -105,4 +105,4 @@ def place_text(track: Track, stop: int) -> str:
     place = float(track.places[stop])
     if not track.mode:
         return centimetres(place)
-    return f"{float(f'{place:.2f}'):+g}{NARROW}mm".replace("-", "−").replace("+0", "0")
+    return numeral(f"{float(f'{place:.2f}'):+g}{NARROW}mm").replace("-", "−").replace("+0", "0")

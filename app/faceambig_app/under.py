@@ -7,7 +7,7 @@ import math
 from faceambig.compose import LEGENDS, shown_surface
 
 from .state import ViewState
-from .text import NARROW, say
+from .text import NARROW, numeral, say
 
 
 def surface(state: ViewState) -> str:
@@ -28,7 +28,7 @@ def words(state: ViewState, mm: float | None) -> str:
         return ""
     if math.isnan(mm):
         return say("under.unmeasured")
-    size = f"{abs(mm):.1f}{NARROW}mm"
+    size = numeral(f"{abs(mm):.1f}{NARROW}mm")
     match surface(state):
         case "depth":
             if size == f"0.0{NARROW}mm":

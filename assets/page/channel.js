@@ -9,6 +9,7 @@
 //   valuetext  {label of a slider: what a screen reader says for its number}
 //   icons      {viser's icon: name of the buttons that show it}
 //   words      {lost, back, no_webgl, copy, close, number}: what this script itself says; the first ones come with the page
+//   lang       language of the page
 //   report     {uuid}: the text control that takes reports; it is answered by "hello"
 //   address    {query}: what the address bar shows after "/?"; never a new entry of the history
 //   copy       {text, n, link}: to the clipboard, once for each n, answered by "copied"; a link: text is its query
@@ -29,7 +30,7 @@
 //
 // Page -> server: one JSON object of one key as the value of the text control; script.py reads them. Pixels count from
 // the upper left corner of the photograph, like the coordinates of its SVG.
-//   hello   {query, reduced_motion, touch, dark, theme, text}: at every connection; theme and text as kept, or null
+//   hello   {query, reduced_motion, touch, dark, theme, text, languages}: at every connection; theme and text as kept, or null
 //   point   {index, x, y, done}: a point moves, at most every 50 ms; done: it has been let go
 //   click   {x, y}: a place on a photograph with data-fa-place
 //   gone    index: Delete on a point

@@ -63,6 +63,7 @@ readers.report = ({ uuid }) => {
     reduced_motion: stillness.matches,
     touch: window.matchMedia("(pointer: coarse)").matches,
     dark: system.matches,
+    languages: navigator.languages.slice(0, 8).map((tag) => tag.slice(0, 40)),
     ...before,
   });
 };

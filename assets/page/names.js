@@ -3,6 +3,7 @@ const pressed = {}; // label of a button group -> the option that is on
 const valuetext = {}; // label of a slider -> its value in words
 const icons = {}; // viser's icon -> name of the button that shows it
 readers.title = (value) => (document.title = value);
+readers.lang = (value) => (document.documentElement.lang = value);
 for (const [kind, known] of Object.entries({ pressed, valuetext, icons })) {
   readers[kind] = (value) => {
     Object.assign(known, value);

@@ -77,7 +77,8 @@ def _card(
     canvas.fill(x, y, 20, CARD_HEIGHT, colour, radius=8)
     canvas.fill(x + 4, y, width - 4, CARD_HEIGHT, CARD, radius=8)
     canvas.text(x + 15, y + 25, sheet.words[which], 14, INK, 600, most=width - 22)
-    end = canvas.text(x + 15, y + 58, value[0], 29, colour, 700)
+    digits = value[0].replace(".", sheet.words["decimal"])
+    end = canvas.text(x + 15, y + 58, digits, 29, colour, 700)
     canvas.text(end + 4, y + 58, value[1], 16, colour, 600)
     canvas.paragraph(x + 15, y + 80, note, 12, DIM, most=width - 23, step=17)
 

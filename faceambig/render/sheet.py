@@ -38,6 +38,7 @@ WORDS: Mapping[str, str] = {
     "implausible": "no longer a plausible face",
     "bar": "{mm}\u202fmm",
     "bar_all": "{mm}\u202fmm, all views",
+    "decimal": ".",  # of numbers
 }
 
 

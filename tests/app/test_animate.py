@@ -102,7 +102,7 @@ def drawing(monkeypatch):
     """Frames without a renderer: a grey that counts up. Returns the list of sizes asked for."""
     sizes = []
 
-    def drawn(scene, *size):
+    def drawn(scene, *size, words):
         sizes.append(size)
         return np.full((size[1], size[0], 4), 10 * len(sizes), np.uint8)
 
@@ -136,7 +136,7 @@ def test_progress_is_for_terminals_and_leaves_an_empty_line(tmp_path, capsys, dr
 
 
 def test_an_interrupt_leaves_the_old_file_and_nothing_else(tmp_path, capsys, monkeypatch):
-    def interrupted(*_):
+    def interrupted(*_, **__):
         raise KeyboardInterrupt
 
     file = tmp_path / "a.webp"

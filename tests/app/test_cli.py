@@ -357,6 +357,7 @@ WRITTEN: dict[str, tuple[str, dict[str, Any]]] = {
     "lesson": ("2", {"lesson": 2}),
     "step": ("3", {"step": 3}),
     "theme": ("dark", {"theme": "dark"}),
+    "lang": ("de", {"lang": "de"}),
     "text": ("1.25", {"text": 1.25}),
 }
 

@@ -23,6 +23,7 @@ from faceambig_app import told as told_of
 from faceambig_app.forms import from_json, to_json
 from faceambig_app.packing import TOLERANCE_MM, directions, packed, restored, rounded, step_of
 from faceambig_app.state import DEFAULT, ViewState, changed
+from faceambig_app.text import speaking
 from scenes import need_renderer
 
 STATE = ViewState(subject=3, distance=0.6, flex=((1, 1.5), (2, -0.5)), surface="difference")
@@ -206,7 +207,10 @@ def test_size_ground_and_own_photo_reach_the_renderer(monkeypatch):
     monkeypatch.setattr("faceambig.render.overlay.draw", drawn)
     with_own_photo(monkeypatch)
     export.files(STATE, "png")
-    export.files(STATE, "png", scale=4, transparent=True, overlays=False, own_photo=True)
+    with speaking("de"):
+        export.files(STATE, "png", scale=4, transparent=True, overlays=False, own_photo=True)
+    said = [options.pop("words")["d_l"] for _, options in asked]
+    assert said == ["Landmark error", "Landmarken-Fehler"]
     assert asked == [
         (False, {"scale": 1, "transparent": False, "overlays": True, "step": None}),
         (True, {"scale": 4, "transparent": True, "overlays": False, "step": None}),

@@ -72,18 +72,26 @@ def test_a_new_change_cuts_redo_and_a_look_around_does_not():
 
 
 def test_moves_of_the_viewer_are_no_steps_and_are_not_undone():
-    assert VIEW == ("flex_from", "view", "orbit", "zoom", "theme", "text")
+    assert VIEW == ("flex_from", "view", "orbit", "zoom", "theme", "text", "lang")
     history = steps(0.3)
     moves = [
         {"view": "free", "orbit": (30.0, 5.0)}, {"orbit": (60.0, 5.0)}, {"zoom": 2.0}, {"theme": "dark"},
-        {"text": 1.5}, {"flex_from": 7},
+        {"text": 1.5}, {"flex_from": 7}, {"lang": "de"},
     ]  # fmt: skip
     for index, move in enumerate(moves):
         history = change(history, changed(history.now, **move), 5.0 + index)
     assert history.past == (DEFAULT,)
     before = undo(history).now
     assert before.distance == DEFAULT.distance
-    assert [getattr(before, name) for name in VIEW] == [7, "free", (60.0, 5.0), 2.0, "dark", 1.5]
+    assert [getattr(before, name) for name in VIEW] == [
+        7,
+        "free",
+        (60.0, 5.0),
+        2.0,
+        "dark",
+        1.5,
+        "de",
+    ]
 
 
 def test_a_look_around_in_a_drag_is_not_a_pause_nor_a_step():

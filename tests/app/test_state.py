@@ -93,7 +93,7 @@ PARTS = {
     "fitting": {"distance", "camera", "modes", "prior", "box"},
     "bend": {"flex", "flex_at", "draw", "extreme"},
     "look": {"show", "surface", "view", "orbit", "zoom", "overlays", "error_scale", "fade", "hide"},
-    "page": {"pins", "pin_names", "lesson", "step", "theme", "text", "flex_from"},
+    "page": {"pins", "pin_names", "lesson", "step", "theme", "text", "lang", "flex_from"},
 }  # fmt: skip
 OTHER = {
     "model": "elsewhere.npz", "subject": "photo", "flex": ((2, 1.0),), "draw": 0, "extreme": 1, "lesson": 1,

@@ -8,19 +8,39 @@ import re
 import string
 import tomllib
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 from unittest.mock import MagicMock
 
 import pytest
 
+import faceambig as fa
 from faceambig.errors import AssetError
+from faceambig.render.sheet import WORDS
+from faceambig.surface import DIRECTIONS, LANDMARK_GROUPS
 from faceambig_app import own, panel, text
 from faceambig_app.actions import ACTIONS
+from faceambig_app.fields import FIELDS, LANGUAGES
 from faceambig_app.guard import page
 from faceambig_app.panel import compare, data, explore, flex, lessons, view, widgets
+from faceambig_app.report import VERDICTS
 from faceambig_app.state import DEFAULT
-from faceambig_app.text import centimetres, distance_text, percent_number, say, words
+from faceambig_app.text import (
+    AUTO,
+    accepted,
+    centimetres,
+    distance_text,
+    drawn_words,
+    each_language,
+    language,
+    movement,
+    numeral,
+    percent_number,
+    say,
+    speaking,
+    words,
+)  # fmt: skip
 
 ROOT = Path(__file__).parents[2]
 APP = ROOT / "app" / "faceambig_app"
@@ -33,6 +53,25 @@ MODULES = {
 FILE = tomllib.loads((ROOT / "assets" / "text" / "en.toml").read_text(encoding="utf-8"))
 KEYS = {f"{section}.{name}" for section, names in FILE.items() for name in names}
 SPEAKING = [name for name, tree in MODULES.items() if "say" in ast.dump(tree) and name != "text"]
+
+
+OTHERS = {
+    path.stem: tomllib.loads(path.read_text(encoding="utf-8"))
+    for path in sorted((ROOT / "assets" / "text").glob("*.toml"))
+    if path.stem != "en"
+}
+# What a mode moves, as the library says it
+MOVED = {
+    *(way for ways in DIRECTIONS for way in ways), *LANDMARK_GROUPS, *fa.load_model("embedded").regions, "face",
+}  # fmt: skip
+# The same in every language: names, signs, and words that are spelt alike
+ALIKE = {
+    "de": {
+        "app.title", "photo.point", "stage.bar", "view.three_quarter", "flex.slider", "flex.mark_tolerance",
+        "player.pause", "error_scale.1", "error_scale.5", "error_scale.10", "error_scale.20", "own.from_file",
+        "drawn.bar", "export.scale", "panel.export", "lang.en", "lang.de", "field.subject",
+    }
+}  # fmt: skip
 
 
 def calls(tree: ast.AST) -> Iterator[ast.Call]:
@@ -101,8 +140,15 @@ def test_every_word_of_the_file_is_asked_for(recorded):
     whole = set(re.findall(r'words\(\)\["(\w+)"\]', inspect.getsource(page)))
     scripted = {key for key in KEYS if key.split(".")[0] in whole}
     points = {f"point.{name}" for name in own.NAMED}
-    assert KEYS - exact - recorded - commands - scripted - points == set()
-    assert (exact | recorded | commands | points) - KEYS == set()
+    signs = {"app.decimal", "app.thousands"}
+    reported = {
+        f"report.{name}" for name in (*VERDICTS.values(), "says", "paper", "ours", "verdict")
+    }
+    drawn = {f"drawn.{name}" for name in set(WORDS) - {"decimal"}}
+    moved = {f"moves.{name}" for name in MOVED}
+    others = commands | points | signs | reported | moved | drawn
+    assert KEYS - exact - recorded - scripted - others == set()
+    assert (exact | recorded | others) - KEYS == set()
 
 
 def test_every_call_fills_in_the_names_its_words_have():
@@ -116,6 +162,136 @@ def test_every_call_fills_in_the_names_its_words_have():
                 part for _, part, _, _ in string.Formatter().parse(FILE[section][name]) if part
             }
             assert needed == {keyword.arg for keyword in call.keywords}, (module, key.value)
+
+
+def placeholders(words: str) -> set[str]:
+    """Names that are filled in."""
+    return {part for _, part, _, _ in string.Formatter().parse(words) if part}
+
+
+@pytest.mark.parametrize("language", OTHERS)
+def test_a_language_has_the_words_of_every_other(language):
+    file = OTHERS[language]
+    assert {section: set(names) for section, names in file.items()} == {
+        section: set(names) for section, names in FILE.items()
+    }
+    for section, names in file.items():
+        for name, said in names.items():
+            assert said.strip(), (section, name)
+            assert placeholders(said) == placeholders(FILE[section][name]), (section, name)
+
+
+@pytest.mark.parametrize("language", OTHERS)
+def test_no_english_is_left_in_another_language(language):
+    alike = {
+        f"{section}.{name}"
+        for section, names in OTHERS[language].items()
+        for name, said in names.items()
+        if said == FILE[section][name]
+    }
+    assert alike == ALIKE[language]
+
+
+@pytest.mark.parametrize("language", OTHERS)
+def test_choices_that_stand_together_are_told_apart(language):
+    # a row of buttons finds out by its words which was pressed
+    for field in FIELDS.values():
+        shown = [OTHERS[language].get(field.name, {}).get(str(choice)) for choice in field.choices]
+        shown = [label for label in shown if label is not None]
+        assert len(set(shown)) == len(shown), field.name
+    # and so does a row of actions
+    said = [[file["action"][name] for name in ACTIONS] for file in (FILE, OTHERS[language])]
+    same = [{(i, k) for i in range(len(row)) for k in range(i) if row[i] == row[k]} for row in said]
+    assert same[1] <= same[0]
+
+
+def test_the_languages_are_those_that_have_a_file():
+    assert {"en", *OTHERS} == set(LANGUAGES)
+    folders = {path.name for path in (ROOT / "assets" / "lessons").iterdir() if path.is_dir()}
+    assert folders == set(LANGUAGES)
+
+
+def test_a_thread_speaks_the_language_it_was_told():
+    def asked(language: str) -> tuple[str, str, str]:
+        with speaking(language):
+            return say("number.d_l"), percent_number(0.391), distance_text(1.2)
+
+    with ThreadPoolExecutor(2) as pool:
+        heard = list(pool.map(asked, ["de", "en"] * 4))
+    german = ("Landmarken-Fehler", "0,39", "1,2\u202fm")
+    assert heard == [german, ("Landmark error", "0.39", "1.2\u202fm")] * 4
+    assert language() == "en"
+
+
+def test_what_is_kept_is_kept_for_each_language():
+    calls_of: list[str] = []
+
+    @each_language(maxsize=4)
+    def title(key: str) -> str:
+        calls_of.append(language())
+        return say(key)
+
+    for _ in range(2):
+        assert title("head.true") == "True face"
+        with speaking("de"):
+            assert title("head.true") == "Wahres Gesicht"
+    assert calls_of == ["en", "de"]
+
+
+# Functions that keep what they return: none of them says a word, or it keeps each language's by itself
+@pytest.mark.parametrize("module", SPEAKING)
+def test_nothing_that_is_kept_says_a_word_of_one_language(module):
+    speakers = {"say", "distance_text", "centimetres", "percent_number", "numeral", "movement"}
+    for node in ast.walk(MODULES[module]):
+        if isinstance(node, ast.FunctionDef) and any(
+            "cache" in ast.unparse(decorator) for decorator in node.decorator_list
+        ):
+            names = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
+            assert not names & speakers, (module, node.name)
+
+
+def test_auto_leaves_the_language_as_it_is():
+    with speaking("de"), speaking(AUTO):
+        assert language() == "de"
+
+
+@pytest.mark.parametrize(
+    ("tags", "found"),
+    [
+        (("de-AT", "en"), "de"),
+        (("fr", "de"), "de"),
+        (("en-GB", "de"), "en"),
+        (("fr",), "en"),
+        ((), "en"),
+        (("DE",), "de"),
+    ],
+)
+def test_a_browser_gets_the_first_of_its_languages_that_there_is(tags, found):
+    assert accepted(tags) == found
+
+
+def test_a_number_alone_is_filled_in_with_the_decimal_sign_of_the_language():
+    with speaking("de"):
+        assert say("pin.d_s", d_s="4.1") == "Oberflächen-Unterschied 4,1\u202fmm"
+        assert say("pin.d_s", d_s="\u22124.1") == "Oberflächen-Unterschied \u22124,1\u202fmm"
+        assert (
+            say("plot.true", distance="v. 1.5 a") == "wahr: v. 1.5 a"
+        )  # no number: somebody's words
+        assert numeral("9,201.5") == "9.201,5"
+
+
+def test_pictures_say_in_english_what_the_library_draws():
+    assert drawn_words() == WORDS
+    with speaking("de"):
+        assert drawn_words().keys() == WORDS.keys()
+        assert drawn_words()["decimal"] == ","
+
+
+def test_what_a_mode_moves_is_said_in_the_language():
+    with speaking("de"):
+        assert movement("nose forward, ears back") == "Nase nach vorn, Ohren nach hinten"
+        assert movement("left cheek wider") == "left cheek breiter"  # a model's own part
+    assert movement("nose forward, ears back") == "nose forward, ears back"
 
 
 def test_say_fills_in_and_does_not_read_what_it_filled_in():
@@ -147,6 +323,8 @@ def shown_literals(tree: ast.Module) -> Iterator[tuple[int, str]]:
             # print and log go to the terminal
             if name in ("say", "print", "getattr", "re.compile") or name.startswith("log"):
                 skipped.update(ast.walk(node))
+        if isinstance(node, ast.JoinedStr) and "default-src" in ast.unparse(node):
+            skipped.update((node, *node.values))  # a policy, which browsers read
         if isinstance(node, ast.JoinedStr) and node not in skipped:
             # one string: its pieces are read together
             parts = [p.value if isinstance(p, ast.Constant) else "\0" for p in node.values]

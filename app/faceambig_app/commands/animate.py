@@ -58,14 +58,16 @@ def run(options: argparse.Namespace) -> int:
     state = state_of(options)
 
     from ..files import writable, write
+    from ..text import speaking
 
     writable(out)  # before the work, not after it
-    if ending == ".html":
-        from ..player import page
+    with speaking(state.lang):
+        if ending == ".html":
+            from ..player import page
 
-        _, data = page(state, whats=(options.what,))
-    else:
-        data = _animation(state, ending[1:], {"what": options.what} | given)
+            _, data = page(state, whats=(options.what,))
+        else:
+            data = _animation(state, ending[1:], {"what": options.what} | given)
     write(out, data)
     return GOOD
 

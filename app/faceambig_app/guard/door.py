@@ -13,6 +13,8 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from ..text import AUTO
+
 # First of all: what the others take from viser is there
 from .pinned import VISER, ServeError
 
@@ -39,6 +41,8 @@ class Hooks:
     words: Callable[[Any, object, object], str] = _no_words  # (control, asked, put) -> the notice
     on_refused: Callable[[int, str], None] = lambda _client_id, _words: None
     on_error: Callable[[int | None, BaseException], None] = lambda _client_id, _error: None
+    # of the words with which a browser's messages are answered
+    language: Callable[[int], str] = lambda _client_id: AUTO
 
 
 @dataclass

@@ -10,6 +10,7 @@ from typing import Any
 import msgspec
 from viser.infra import _infra
 
+from ..text import AUTO, speaking
 from .door import DOOR, log_line
 from .sessions import SESSION
 
@@ -126,7 +127,8 @@ FIELDS: Mapping[str, Mapping[str, Callable[[Any], bool]]] = {
 async def dispatch(self: Any, client_id: Any, message: Any) -> None:
     door = DOOR.get()
     try:
-        await real_dispatch(self, client_id, message)
+        with speaking(AUTO if door is None else door.hooks.language(int(client_id))):
+            await real_dispatch(self, client_id, message)  # the tasks that it makes speak it too
     except Exception as error:
         if door is None:
             raise

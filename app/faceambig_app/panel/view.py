@@ -19,3 +19,4 @@ def build(w: Widgets) -> None:
     with folder(w, "page"):
         w.buttons("theme")
         w.slider("text")
+        w.buttons("lang")

@@ -14,7 +14,7 @@ import viser
 
 from ..fields import FIELDS, Field
 from ..state import ViewState, changed
-from ..text import say
+from ..text import numeral, say
 
 Change = Callable[[ViewState], ViewState]
 Tell = Callable[[Change], None]
@@ -103,7 +103,7 @@ class Widgets:
         field = FIELDS[name]
         handle = self.gui.add_slider(
             say(f"field.{name}"), 0, to_step(field, field.high), 1, 0,
-            marks=tuple((to_step(field, mark), f"{mark:g}") for mark in marks), hint=say(f"field.{name}_hint"),
+            marks=tuple((to_step(field, mark), numeral(f"{mark:g}")) for mark in marks), hint=say(f"field.{name}_hint"),
         )  # fmt: skip
         self._steps.append(handle._impl.uuid)
         self.bind(handle, lambda state: to_step(field, getattr(state, name)),
