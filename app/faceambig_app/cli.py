@@ -44,7 +44,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit status."""
     options = parser().parse_args(arguments)
     try:
-        return options.run(options)
+        status = options.run(options)
+        sys.stdout.flush()  # here, not when Python ends: the reader may have gone
+        return status
     except (
         BrokenPipeError
     ):  # the reader has enough, as `| head` has: no error, and nothing more is written
