@@ -39,7 +39,9 @@ def tool(name: str, folder: Path = ROOT / "tools") -> ModuleType:
 
 
 @pytest.mark.parametrize(
-    "path", [p for p in PAGES if SESSION.search(p.read_text("utf-8"))], ids=lambda p: p.stem
+    "path",
+    [p for p in PAGES if SESSION.search(p.read_text("utf-8"))],
+    ids=lambda p: f"{p.parent.name}-{p.stem}",
 )
 def test_sessions_print_what_the_page_shows(path: Path) -> None:
     parsed = doctest.DocTestParser().get_doctest(session(path), {}, path.name, str(path), 0)
@@ -137,7 +139,7 @@ def test_every_page_is_in_the_table_of_contents() -> None:
     assert {path.stem for path in DOCS.glob("*.md")} - {"index"} <= named
 
 
-@pytest.mark.parametrize("path", PAGES, ids=lambda p: p.stem)
+@pytest.mark.parametrize("path", PAGES, ids=lambda p: f"{p.parent.name}-{p.stem}")
 def test_links_lead_somewhere(path: Path) -> None:
     for target in re.findall(r'(?:\]\(|href=")([^)"]+)', path.read_text("utf-8")):
         file = target.partition("#")[0]
