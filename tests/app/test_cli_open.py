@@ -620,8 +620,8 @@ def test_ctrl_c_ends_a_running_command(tmp_path):
     with subprocess.Popen(
         [sys.executable, "-c", code, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE
     ) as run:
-        while run.poll() is None and not (out.exists() and any(out.iterdir())):
-            time.sleep(0.02)  # until it writes
+        while run.poll() is None and not any(path.is_file() for path in tmp_path.rglob("*")):
+            time.sleep(0.02)  # until it writes, beside the folder that it fills at the end
         run.send_signal(signal.SIGINT)
         said = run.communicate()
     assert run.returncode == 130

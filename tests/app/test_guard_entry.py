@@ -37,6 +37,7 @@ def tiny() -> Iterator[Tiny]:
 def who_has_the_cookie_is_served(tiny: Tiny) -> Iterator[None]:
     tiny.forget()
     yield
+    assert until(lambda: not tiny.sessions)  # those of the test have been seen to leave
     tiny.works()
 
 

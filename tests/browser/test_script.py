@@ -185,7 +185,10 @@ def test_hello_tells_what_the_server_must_know_and_theme_and_text_are_kept(
         is_mobile=True,
     )
     hello = server.of(script.Hello)
-    assert hello == [script.Hello("fixedDpr=0.25&distance=1.2", True, True, True, None, None)]
+    languages = tuple(page.evaluate("() => navigator.languages"))
+    assert languages
+    query = "fixedDpr=0.25&distance=1.2"
+    assert hello == [script.Hello(query, True, True, True, None, None, languages)]
     assert page.evaluate("() => window.first") == "dark"  # nobody has chosen: as the system
     theme_and_text_live_and_kept(server, page)
 
