@@ -25,7 +25,7 @@ def test_its_commands_exist():
 
     commands = re.findall(r"^faceambig (\w+)", README, re.MULTILINE)
     assert set(commands) == {
-        "serve", "snapshot", "animate", "fit", "sweep", "modes", "posterior", "landmarks", "models",
+        "serve", "snapshot", "animate", "fit", "sweep", "modes", "posterior", "landmarks", "models", "reproduce",
     }  # fmt: skip
     for line in re.findall(r"^faceambig (.+?)(?:\s+#.*)?$", README, re.MULTILINE):
         parser().parse_args(line.split())

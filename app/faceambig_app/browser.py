@@ -147,7 +147,7 @@ class Browser:
         if self.room.left:
             return
         if not self._built:
-            self._build()
+            self._translate()
         if self._seat is not None and not self._greeted:
             self._begin(self.room.state)
         self.room.open()

@@ -12,11 +12,10 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from html import escape
 
-from .history import OF_THE_READER
 from .lesson_room import Place
 from .lessons import Ask, Lessons
 from .panel.classroom import Shown
-from .state import DEFAULT, ViewState, changed
+from .state import DEFAULT, ViewState, changed, for_eyes_of
 from .text import say
 
 log = logging.getLogger("faceambig")
@@ -239,11 +238,6 @@ class Seat:
         if not self.following:
             return say("class.alone")
         return say("class.private") if room.private else say("class.follows")
-
-
-def for_eyes_of(state: ViewState, reader: ViewState) -> ViewState:
-    """A state as a reader wants to see it: what is about eyes is the reader's."""
-    return changed(state, **{name: getattr(reader, name) for name in OF_THE_READER})
 
 
 def bars_html(ask: Ask, answers: list[float], present: int) -> str:

@@ -15,7 +15,7 @@ from typing import TypeVar
 from . import figures, photograph, pipeline, plots
 from .pipeline import Frame, frame, plots_of
 from .scenes import whole
-from .state import DEFAULT, ViewState, changed
+from .state import DEFAULT, ViewState, for_eyes_of
 from .text import language
 from .told import Slider, flex_lines, pins_of, sliders_of, spectrum_of, told
 
@@ -118,21 +118,18 @@ _KEPT = Kept()
 
 def drawn(state: ViewState, draft: bool, rested: ViewState | None) -> Drawn:
     """A state as all browsers show it; `rested`: what this one showed in full last, which a draft may need."""
-    state = _plain(state)
+    state = for_eyes_of(
+        state, DEFAULT
+    )  # no picture depends on those, words on the language that is spoken
     if not draft:
         return _KEPT.get(
             (state, language(), None), lambda: Drawn(state, frame(state, with_curves=False), False)
         )
-    before = None if rested is None or not _asks(state) else _plain(rested)
+    before = None if rested is None or not _asks(state) else for_eyes_of(rested, DEFAULT)
     return _KEPT.get(
         (state, language(), before, "draft"),
         lambda: Drawn(state, pipeline.draft(state, before), True),
     )
-
-
-def _plain(state: ViewState) -> ViewState:
-    """A state without what no picture and no word depends on."""
-    return changed(state, theme=DEFAULT.theme, text=DEFAULT.text)
 
 
 def _asks(state: ViewState) -> bool:

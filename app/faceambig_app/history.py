@@ -10,13 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from .fields import FIELDS
-from .state import DEFAULT, ViewState, changed
+from .state import DEFAULT, ViewState, changed, for_eyes_of
 
 STEPS = 100
 STEP_CLOSES = 0.4  # seconds after the last change
 VIEW = tuple(name for name, field in FIELDS.items() if field.view)
 NOT_VIEW = tuple(name for name, field in FIELDS.items() if not field.view)
-OF_THE_READER = ("theme", "text", "lang")  # a reset leaves them: they are about eyes, not faces
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,8 +58,7 @@ def redo(history: History) -> History:
 
 def reset(history: History, start: ViewState = DEFAULT) -> History:
     """Back to `start`, as a step of its own; colours of the page, size of letters and language stay."""
-    kept = {name: getattr(history.now, name) for name in OF_THE_READER}
-    state = changed(start, **kept)
+    state = for_eyes_of(start, history.now)
     if _same(state, history.now):
         return replace(history, now=state, changed_at=None)
     return History(state, (*history.past, history.now)[-STEPS:])

@@ -12,10 +12,9 @@ from .lesson_page import step_html, teacher_html
 from .lessons import Ask, Lessons, Step
 from .panel import Change
 from .panel.lessons import Shown
-from .state import DEFAULT, ViewState, changed
+from .state import DEFAULT, ViewState, changed, for_eyes_of
 from .text import say
 
-OF_THE_READER = ("theme", "text", "lang")  # a step leaves them: they are about eyes
 Place = tuple[int, int]  # lesson and step
 
 
@@ -102,9 +101,7 @@ class LessonRoom:
             self._notice(say("lesson.missing", number=state.lesson))
             return _left(state)
         _, place = self._place(state)
-        bare = changed(
-            state, lesson=None, step=DEFAULT.step, **{name: getattr(DEFAULT, name) for name in OF_THE_READER}
-        )  # fmt: skip
+        bare = changed(for_eyes_of(state, DEFAULT), lesson=None, step=DEFAULT.step)
         return self._at(*place, state) if bare == DEFAULT and place is not None else state
 
     def predict(self, words: str) -> None:
@@ -162,7 +159,7 @@ class LessonRoom:
     def _at(self, number: int, k: int, now: ViewState) -> ViewState:
         """The beginning of a step, for eyes as they are; a prediction that was made hides nothing again."""
         step = self._lessons.by_number[number].steps[k - 1]
-        state = changed(step.state, **{name: getattr(now, name) for name in OF_THE_READER})
+        state = for_eyes_of(step.state, now)
         return _numbers_told(state) if (number, k) in self._said else state
 
     def _problems(self) -> str:

@@ -17,7 +17,7 @@ from .fields import FIELDS, PINS, Field, canonical
 
 __all__ = [
     "DEFAULT", "FIELDS", "VERSION", "Bend", "Field", "Fitting", "Look", "Target", "ViewState",
-    "changed", "names_of_pins", "short",
+    "changed", "for_eyes_of", "names_of_pins", "short",
 ]  # fmt: skip
 
 VERSION = 1  # of the format of links and files
@@ -169,6 +169,7 @@ _FIELDS_OF: dict[type[Any], Callable[[ViewState], tuple[Any, ...]]] = {
 }
 _OF_A_FACE = tuple(n for n, f in FIELDS.items() if f.part in ("target", "fitting", "bend"))
 _NOT_OF_A_FACE = tuple(name for name in FIELDS if name not in _OF_A_FACE)
+_OF_THE_READER = ("theme", "text", "lang")
 _ALONE = FIELDS.keys() - {"model", "pins", "pin_names"}  # what no other field's value depends on
 
 
@@ -208,6 +209,11 @@ def changed(state: ViewState, **values: Any) -> ViewState:
         msgspec.structs.force_setattr(made, name, canonical(FIELDS[name], value))
     made.check()
     return made
+
+
+def for_eyes_of(state: ViewState, reader: ViewState) -> ViewState:
+    """A state as a reader wants to see it: colours of the page, size of letters and language are the reader's."""
+    return changed(state, **{name: getattr(reader, name) for name in _OF_THE_READER})
 
 
 DEFAULT = ViewState()
