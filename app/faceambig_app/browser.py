@@ -447,7 +447,7 @@ class Browser:
             self._lessons.watch(drawn, rest.numbers)
 
     def _say_again(self, state: ViewState) -> None:
-        """The controls of a state at rest, those that nothing has changed too; of one that cannot be drawn as well."""
+        """The controls of a state at rest, or of one that cannot be drawn: once more those that somebody has moved."""
         if not self.room.left and self.room.state == state:
             self.panel.show(state)
-            guard.restate(self._client, self.panel.controls)
+            guard.restate(self._client, self.panel.widgets.touched())

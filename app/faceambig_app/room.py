@@ -5,6 +5,8 @@ computes and draws. A room waits at most once and is served by one worker at a t
 lands after a new one, and the newest state wins.
 
 While values keep coming the room draws drafts (coarse mesh, no curves); after REST seconds of silence it draws in full.
+However late a value is served, its draft comes first, and a full frame lets drafts of others pass: a crowd that would
+be drawn in full because it is slow, and so be slower still, gets out of it.
 """
 
 from __future__ import annotations
@@ -22,6 +24,8 @@ from .state import ViewState
 log = logging.getLogger("faceambig")
 
 REST = 0.2  # seconds without a change before the full mesh is drawn
+BREATH = 0.05  # seconds after a draft that came late: newer values may wait to be heard
+YIELD = 0.3  # seconds for which a full frame lets drafts pass, and no longer
 FAREWELL = 1.0  # seconds for what is being computed when the page is closed
 WORKERS = 2  # measured: one was not better than two, and Python holds the interpreter's lock beyond
 
@@ -71,7 +75,8 @@ class Room:
             return
         at, state = self._changed_at, self.state  # in this order: go() sets the state first
         wait = at + REST - time.monotonic()
-        draft = wait > 0
+        new = at > 0 and (self._drawn is None or self._drawn[0] != at)
+        draft = new or wait > 0
         if self._drawn not in ((at, draft), (at, False)):
             try:
                 self._painter.draw(state, draft)
@@ -81,7 +86,7 @@ class Room:
                 if not self.left:
                     self._painter.refuse(error)
         if self._drawn == (at, True):
-            self._ring(self, wait)
+            self._ring(self, max(wait, BREATH))
 
 
 class Dispatcher:
@@ -90,11 +95,10 @@ class Dispatcher:
     def __init__(self, serve: Callable[[Any], None] = Room.serve, workers: int = WORKERS) -> None:
         self._serve = serve
         self._changed = threading.Condition()
-        self._waiting: dict[
-            Any, None
-        ] = {}  # used as a set that keeps order: the place in the line is kept
+        self._waiting: dict[Any, float] = {}  # since when, in monotonic seconds: the place in the line
         self._served: set[Any] = set()
-        self._later: list[tuple[float, int, Any]] = []  # (monotonic seconds, running number, room)
+        self._booked: dict[Any, float] = {}  # monotonic seconds of a later turn, at most one a room
+        self._later: list[tuple[float, int, Any]] = []  # a heap of those, and of some replaced since
         self._number = itertools.count()
         self._closed = False
         self._threads = [
@@ -105,13 +109,14 @@ class Dispatcher:
             thread.start()
 
     def ring(self, room: Any, after: float = 0.0) -> None:
-        """Ask that `room` be served, now or `after` seconds from now."""
+        """Ask that `room` be served, now or at most `after` seconds from now."""
+        now = time.monotonic()
         with self._changed:
             if after > 0:
-                heapq.heappush(self._later, (time.monotonic() + after, next(self._number), room))
+                self._book(room, now + after)
             else:
-                self._waiting.setdefault(room)
-            self._changed.notify()
+                self._waiting[room] = min(now, self._waiting.get(room, now))
+                self._changed.notify()
 
     def close(self) -> None:
         """Stop the workers; a room being served is finished first, if that takes no longer than FAREWELL."""
@@ -122,6 +127,14 @@ class Dispatcher:
         for thread in self._threads:
             thread.join(timeout=max(0.0, end - time.monotonic()))
 
+    def _book(self, room: Any, due: float) -> None:
+        if due >= self._booked.get(room, due + 1.0):  # it has a turn before, and may ask again then
+            return
+        self._booked[room] = due
+        heapq.heappush(self._later, (due, next(self._number), room))
+        if self._later[0][0] == due:  # sooner than all: whoever sleeps would sleep too long
+            self._changed.notify_all()
+
     def _work(self) -> None:
         while True:
             with self._changed:
@@ -131,9 +144,8 @@ class Dispatcher:
                     self._changed.wait(self._until_later())
                 if self._closed:
                     return
-                del self._waiting[
-                    room
-                ]  # before the state is read: a ring from here on is a new turn
+                # before the state is read: a ring from here on is a new turn
+                del self._waiting[room]
                 self._served.add(room)
             try:
                 self._serve(room)
@@ -141,14 +153,17 @@ class Dispatcher:
                 log.exception("a room could not be served")
             finally:
                 with self._changed:
-                    self._served.discard(room)
-                    self._changed.notify()
+                    self._served.discard(room)  # who rang meanwhile is found by this worker
 
     def _next(self) -> Any | None:
         now = time.monotonic()
         while self._later and self._later[0][0] <= now:
-            self._waiting.setdefault(heapq.heappop(self._later)[2])
-        return next((room for room in self._waiting if room not in self._served), None)
+            due, _, room = heapq.heappop(self._later)
+            if self._booked.get(room) == due:
+                del self._booked[room]
+                self._waiting.setdefault(room, due + YIELD)
+        waiting = (room for room in self._waiting if room not in self._served)
+        return min(waiting, key=self._waiting.__getitem__, default=None)
 
     def _until_later(self) -> float | None:
         return max(0.0, self._later[0][0] - time.monotonic()) if self._later else None

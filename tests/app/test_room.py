@@ -158,6 +158,44 @@ def test_a_later_turn_is_not_kept_back_by_a_busy_worker(dispatchers):
         free.clear()
 
 
+def test_many_later_turns_of_one_room_are_one(dispatchers):
+    served: list[str] = []
+    dispatcher = dispatchers(served.append)
+    for _ in range(50):
+        dispatcher.ring("a", 0.02)
+    dispatcher.ring("end", 0.06)
+    until(lambda: "end" in served)
+    assert served == ["a", "end"]
+
+
+class Clock:
+    """Time that passes when it is told to."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+
+    def monotonic(self) -> float:
+        return self.now
+
+
+def test_a_full_frame_lets_drafts_pass_but_not_for_ever(dispatchers, monkeypatch):
+    clock = Clock()
+    monkeypatch.setattr(module, "time", clock)
+    dispatcher = dispatchers(workers=0)
+    dispatcher.ring("full", REST)
+    clock.now += REST
+    assert dispatcher._next() == "full"  # nobody else waits
+    clock.now += 0.5 * module.YIELD
+    dispatcher.ring("draft")
+    assert dispatcher._next() == "draft"
+    clock.now += module.YIELD
+    dispatcher.ring("another")
+    del dispatcher._waiting["draft"]
+    assert dispatcher._next() == "full"
+    dispatcher.ring("full")  # whoever rings does not lose the place
+    assert dispatcher._next() == "full"
+
+
 def test_close_finishes_who_is_served_and_drops_who_waits():
     started, go, done = threading.Event(), threading.Event(), []
 
@@ -242,6 +280,23 @@ def test_while_values_keep_coming_there_are_only_drafts_and_the_last_value_is_dr
     full = [state for state, draft in canvas.drawn if not draft]
     assert len(full) < 10
     assert full[-1] == last
+
+
+def test_a_value_that_is_served_late_is_a_draft_first(monkeypatch):
+    # else a crowd that waits longer than REST is drawn in full, which takes longer still
+    clock, canvas = Clock(), Canvas()
+    monkeypatch.setattr(module, "time", clock)
+    rings: list[float] = []
+    room = Room(DEFAULT, canvas, lambda _, after: rings.append(after))
+    for metres in (0.5, 0.6):
+        room.go(at(metres))
+        clock.now += 10 * REST
+        room.serve()
+    assert canvas.drawn == [(at(0.5), True), (at(0.6), True)]
+    assert rings == [0.0, module.BREATH, 0.0, module.BREATH]
+    room.serve()
+    assert canvas.drawn[-1] == (at(0.6), False)
+    assert len(rings) == 4
 
 
 def test_a_draft_is_not_drawn_again_while_nothing_changes(dispatchers, quick):

@@ -92,7 +92,7 @@ def _put_back(api: Any, client_id: Any, control: Any) -> None:
 
 
 def restate(client: viser.ClientHandle, controls: Iterable[Any]) -> None:
-    """Send the values of controls, those that the server has not changed too.
+    """Send the values of controls once more.
 
     A value of ours that crosses an older one of the browser's on the way is shown there and is wrong here; saying it
     once more when nobody moves ends the disagreement. A field that is being typed into keeps what stands there.

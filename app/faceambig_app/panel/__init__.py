@@ -109,11 +109,6 @@ class Panel:
         self.lesson.build_list()
         return heading, *photo
 
-    @property
-    def controls(self) -> tuple[viser.GuiInputHandle, ...]:
-        """All that hold a value of the state."""
-        return self.widgets.controls
-
     def show(self, state: ViewState) -> None:
         """Write a state into the widgets; on the event loop only, so an older value never overwrites a newer one."""
         self.widgets.show(state)

@@ -54,6 +54,7 @@ class Lessons:
 
     def __init__(self, w: Widgets, does: Does) -> None:
         self._w, self._does = w, does
+        self._shown = Shown()
         self._on: dict[str, bool] = {}  # names of what can be seen
         self._text = w.gui.add_html("")
         self._buttons = [_button(w.gui, f"{k}") for k in range(CHOICES)]
@@ -97,6 +98,9 @@ class Lessons:
 
     def show(self, shown: Shown) -> None:
         """Write what is shown; on the event loop only."""
+        if shown == self._shown:
+            return
+        self._shown = shown
         self._text.content, self._teacher.content = shown.html, shown.teacher
         self._problems.content = shown.problems
         for k, button in enumerate(self._buttons):

@@ -33,15 +33,17 @@ class Widgets:
         self._tell, self._act = tell, act
         self._shown: list[tuple[viser.GuiInputHandle[Any], Callable[[ViewState], Any]]] = []
         self._last: list[Any] = []  # what was shown in each, unless a person has changed it since
+        self._touched: set[int] = set()  # those that somebody has changed since `touched` was asked
         self._watched: list[tuple[Callable[[ViewState], Any], Callable[[Any], None]]] = []
         self._seen: list[Any] = []  # what each watcher was told
         self._pressed: dict[str, Callable[[ViewState], str]] = {}  # label of a group -> option on
         self._steps: list[str] = []
 
-    @property
-    def controls(self) -> tuple[viser.GuiInputHandle[Any], ...]:
-        """All that hold a value of the state."""
-        return tuple(handle for handle, _ in self._shown)
+    def touched(self) -> list[viser.GuiInputHandle[Any]]:
+        """The widgets that a person or `show` has changed since this was asked: there both may have crossed."""
+        touched = [self._shown[index][0] for index in sorted(self._touched)]
+        self._touched.clear()
+        return touched
 
     @property
     def step_sliders(self) -> tuple[str, ...]:
@@ -61,6 +63,7 @@ class Widgets:
             self._last[index] = value
             if handle.value != value:  # asked first: viser looks up types at every assignment
                 handle.value = value
+                self._touched.add(index)
         for index, (read, tell) in enumerate(self._watched):
             value = read(state)
             if value != self._seen[index]:
@@ -185,6 +188,7 @@ class Widgets:
 
         def changes(value: Any) -> Change:
             self._last[index] = _NOTHING
+            self._touched.add(index)
             return write(value)
 
         handle.on_update(self.heard(changes))
