@@ -13,7 +13,7 @@ from typing import cast
 
 import viser
 
-from . import figures, guard, history, own_page, under
+from . import figures, guard, history, own_page
 from .actions import ACTIONS
 from .classroom import Classroom, Seat
 from .display import Display, Rest
@@ -27,7 +27,7 @@ from .link import query
 from .notices import cause, from_query
 from .orders import Orders
 from .own_room import OwnRoom
-from .panel import Change, Panel
+from .panel import Change, Panel, palette
 from .panel.classroom import Shown
 from .panel.widgets import setting
 from .room import REST, Dispatcher, Room
@@ -51,6 +51,7 @@ from .stage import Stage
 from .state import DEFAULT, ViewState, changed
 from .style import STYLE
 from .text import AUTO, accepted, language, say, speaking, words
+from .under import Pointer
 
 log = logging.getLogger("faceambig")
 
@@ -78,15 +79,13 @@ class Browser:
         self._glide = Glide(self._glided)
         self._still = False  # whether this person wants no motion
         self._dark = False  # whether this person's system is dark
-        self._probing = False  # whether the page may ask what is under the pointer
-        self._probed = ""  # what it was answered
-        self._settled: ViewState | None = None  # the state drawn in full last
         self._greeted = False  # whether the page's script has told its address
         self._owned = False  # whether there is a photograph of this person
         self.language = self._asked = language()  # spoken; what the browser asks for
         self.stage = Stage(client, self._orbited)
         self._dress()
         self.script = Script(client.gui, self.report)
+        self._pointer = Pointer(self.script, self.stage.value)
         self._own = OwnRoom(
             loop, self._own_changed, self.notice, steps=lambda: len(self._history.past)
         )
@@ -131,7 +130,8 @@ class Browser:
         style = STYLE + figures.hidden_boxes(panel.widgets.step_sliders)
         panel.places.style.content = style
         panel.show(self.room.state)
-        self._command_palette()
+        leads = self._seat is not None and self._seat.may_lead
+        palette.register(self._client.gui, self.act, () if leads else ("reveal",))
         self._built = True
         if self._seat is not None:
             self._seat.show()
@@ -227,7 +227,7 @@ class Browser:
         if not self._built or self.language != language():
             self._translate()
         self.room.go(to.now)
-        self._read(before, to.now)
+        self._pointer.moved(before, to.now)
         if (before.theme, before.text) != (to.now.theme, to.now.text):
             self._dress()
             self.script.theme(cast(Theme, to.now.theme), to.now.text)
@@ -303,24 +303,7 @@ class Browser:
             case Point() | Click() | Gone():
                 self._own.hear(report)
             case Probe():
-                self._answer(report)
-
-    def _answer(self, probe: Probe) -> None:
-        """Say what is under the pointer; nothing while what is drawn is not yet what the state says."""
-        mm = None
-        if self.room.state == self._settled:
-            mm = self.stage.value(probe.head, probe.vertex)
-        self._probed = under.words(self.room.state, mm)
-        self.script.probed(probe.n, self._probed)
-
-    def _read(self, before: ViewState, now: ViewState) -> None:
-        """Let the pointer read numbers where colours are some; what it has read of another state holds no more."""
-        if self._probed and now != before:
-            self._probed = ""
-            self.script.probed(0, "")
-        if under.has_values(now) != self._probing:
-            self._probing = not self._probing
-            self.script.probe(self._probing)
+                self._pointer.asks(report, self.room.state)
 
     def _own_changed(self) -> None:
         """Another photograph, other points, or none any more: show them."""
@@ -385,24 +368,6 @@ class Browser:
             control_width="large",
         )
 
-    def _command_palette(self) -> None:
-        for action in ACTIONS.values():
-            if action.name == "reveal" and (self._seat is None or not self._seat.may_lead):
-                continue
-            entry = self._client.gui.add_command(
-                say(f"action.{action.name}"),
-                description=say(f"action.{action.name}_hint"),
-                hotkey=action.key,
-                modifier=action.modifier,
-            )
-            entry.on_trigger(self._triggered(action.name))
-
-    def _triggered(self, name: str):
-        async def triggered(_event: object) -> None:
-            self.act(name)
-
-        return triggered
-
     # ---------------------------------------------------------------- what it shows, by a worker
 
     def notice(self, words: str) -> None:
@@ -438,7 +403,7 @@ class Browser:
     def _settle(self, drawn: ViewState, rest: Rest, display: Display) -> None:
         """At rest, on the loop: what the controls show is what is, even where messages crossed on the way."""
         if display is self._display and not self.room.left and self.room.state == drawn:
-            self._settled = drawn
+            self._pointer.settled = drawn
             self._hint = rest.hint
             self._show_own()
             self.script.address(query(drawn))

@@ -95,10 +95,14 @@ class Dispatcher:
     def __init__(self, serve: Callable[[Any], None] = Room.serve, workers: int = WORKERS) -> None:
         self._serve = serve
         self._changed = threading.Condition()
-        self._waiting: dict[Any, float] = {}  # since when, in monotonic seconds: the place in the line
+        self._waiting: dict[
+            Any, float
+        ] = {}  # since when, in monotonic seconds: the place in the line
         self._served: set[Any] = set()
         self._booked: dict[Any, float] = {}  # monotonic seconds of a later turn, at most one a room
-        self._later: list[tuple[float, int, Any]] = []  # a heap of those, and of some replaced since
+        self._later: list[
+            tuple[float, int, Any]
+        ] = []  # a heap of those, and of some replaced since
         self._number = itertools.count()
         self._closed = False
         self._threads = [

@@ -52,7 +52,8 @@ class Flex:
             place = k % MODES
             there = place < len(sliders)
             told = sliders[place] if there else (say("field.flex", letter=LETTERS[place]), ())
-            handle.disabled = not there
+            if handle.disabled == there:  # asked first: viser looks up types at every assignment
+                handle.disabled = not there
             if told != self._told[k]:
                 self._told[k] = told
                 handle.label = told[0]
