@@ -32,6 +32,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from websockets.exceptions import InvalidStatus
 from wire import GONE, Wire
 
 EVERY = 5.0  # seconds between two samples
@@ -90,18 +91,25 @@ class Person(threading.Thread):
         while not self._stopped.is_set():
             try:
                 wire = Wire(self._port, self._query)
+            except (*GONE, InvalidStatus) as error:
+                self.errors.append(f"not let in: {type(error).__name__}: {error}")
+                self._wait(1.0)
+                continue
+            try:
                 self.did["came"] += 1
                 if wire.rests(PATIENCE):
                     self._visit(wire)
                 else:
                     self.errors.append("no first frame")
-                    wire.close()
             except GONE as error:
                 self.did["was cut off"] += 1
                 if not self._stopped.is_set() and "nonsense" not in self.did:
                     self.errors.append(f"{type(error).__name__}: {error}")
             except LookupError as error:
                 self.errors.append(f"{type(error).__name__}: {error}")
+            finally:
+                with suppress(*GONE):
+                    wire.close()
             self._wait(1.0)
 
     def _visit(self, wire: Wire) -> None:
@@ -113,13 +121,11 @@ class Person(threading.Thread):
                 return
             if chance < 0.04:
                 self.did["left"] += 1
-                wire.close()
                 return
             self.did[does.__name__] += 1
             does(self, wire, self._rng)
             self._query = wire.query or ""
             self._read_for(wire, self._rng.expovariate(1 / self._pause))
-        wire.close()
 
     def _read_for(self, wire: Wire, seconds: float) -> None:
         wire.wait(self._stopped.is_set, min(seconds, 60.0))

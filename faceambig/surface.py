@@ -27,7 +27,7 @@ LANDMARK_GROUPS = {
 }  # fmt: skip
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=4)  # 22 MB each
 def _rows(model: FaceModel) -> Array:
     """Modes (S, 3, E) of the evaluation region: in this order a few directions move it in 0.6 of the time."""
     return read_only(np.ascontiguousarray(model.rows(_measured(model))[1].transpose(2, 1, 0)))

@@ -9,8 +9,7 @@ from __future__ import annotations
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
-from functools import cached_property
-from typing import TypeVar
+from typing import Any, Generic, TypeVar
 
 from . import figures, photograph, pipeline, plots
 from .pipeline import Frame, frame, plots_of
@@ -24,69 +23,86 @@ KEPT = 12  # states; each holds its heads, some megabytes
 _T = TypeVar("_T")
 
 
+class _once(Generic[_T]):
+    """A property that is made once. functools' own holds, until Python 3.12, one lock for all instances: a sweep of
+    seconds for one browser would keep every other from its plots.
+    """
+
+    def __init__(self, make: Callable[[Any], _T]) -> None:
+        self._make, self._name, self.__doc__ = make, make.__name__, make.__doc__
+
+    def __get__(self, drawn: Drawn, _owner: type | None = None) -> _T:
+        made = vars(drawn)  # where it is found from then on, before this
+        with drawn.lock:
+            if self._name not in made:
+                made[self._name] = self._make(drawn)
+            return made[self._name]
+
+
 class Drawn:
     """One state, at rest or as a draft: its frame, and its words and plots as HTML."""
 
     def __init__(self, state: ViewState, shown: Frame, draft: bool) -> None:
         self.state, self.frame, self.scene = state, shown, whole(shown.scene)
+        self.lock = threading.RLock()  # who makes one of its properties
         self._draft = draft
 
-    @cached_property
+    @_once
     def cards(self) -> str:
         """The two numbers."""
         return figures.cards(self.scene.numbers, hide=self.state.hide)
 
-    @cached_property
+    @_once
     def marks(self) -> str:
         """The circles on the photograph."""
         return photograph.photo_marks(self.scene.photo, crosses=False, hover=not self._draft)
 
-    @cached_property
+    @_once
     def crosses(self) -> str:
         """Its points."""
         return photograph.photo_crosses(self.scene.photo)
 
-    @cached_property
+    @_once
     def side_by_side(self) -> str:
         """Circles and numbers, where there is no second panel."""
         return figures.side_by_side(self.marks, self.cards)
 
-    @cached_property
+    @_once
     def curves(self) -> str:
         """The plots; of a new target a sweep and a posterior."""
         return plots.plots(
             plots_of(self.state), self.scene.numbers, hide=self.state.hide, brief=self._draft
         )
 
-    @cached_property
+    @_once
     def legend(self) -> str:
         """Which face stands for the fitted one, and the scale of colours."""
         legend = "" if self.scene.legend is None else figures.legend(self.scene.legend)
         return figures.told(told(self.state)) + legend
 
-    @cached_property
+    @_once
     def spoken(self) -> str:
         """In words, for screen readers."""
         words = figures.spoken(self.scene.numbers, hide=self.state.hide)
         return words + figures.heads_words(self.scene)
 
-    @cached_property
+    @_once
     def flex(self) -> str:
         """What the flexibility modes move."""
         return figures.flex_words(flex_lines(self.state))
 
-    @cached_property
+    @_once
     def spectrum(self) -> str:
         """How far each of them may."""
         return figures.spectrum(*spectrum_of(self.state))
 
-    @cached_property
+    @_once
     def pins(self) -> str:
         """The faces kept."""
         pins = pins_of(self.state)
         return figures.pins(pins.names, pins.words, pins.d_s_mm)
 
-    @cached_property
+    @_once
     def sliders(self) -> Sequence[Slider]:
         """What the sliders of flexibility modes are told."""
         return sliders_of(self.state)

@@ -21,7 +21,7 @@ from .state import Bend, Fitting, Target
 FEW = (0.2, 3.0, 13)
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=64)
 def face(target: Target, fitting: Fitting, bend: Bend) -> Face:
     """The face of a state, measured against the true one.
 

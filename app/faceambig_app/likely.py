@@ -56,7 +56,7 @@ class FlexMode:
     tolerance_mm: float  # moves the landmarks as much as a person does not see
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=64)
 def bending(target: Target, fitting: Fitting, flex_at: str, count: int) -> FlexibilityModes:
     """The `count` most flexible modes of a fit, all of them where it has less."""
     fit = explained(target, fitting)
@@ -100,7 +100,7 @@ def source(target: Target, fitting: Fitting) -> Source:
     return Source(target, fitting.prior)
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=8)  # up to 8 MB each
 def posterior(of: Source) -> Posterior:
     """Faces and distances that a target's points leave open: all modes, no box, as the library advises."""
     taken = photograph(of.target)

@@ -17,7 +17,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from .state import ViewState
 
@@ -27,7 +27,9 @@ REST = 0.2  # seconds without a change before the full mesh is drawn
 BREATH = 0.05  # seconds after a draft that came late: newer values may wait to be heard
 YIELD = 0.3  # seconds for which a full frame lets drafts pass, and no longer
 FAREWELL = 1.0  # seconds for what is being computed when the page is closed
-WORKERS = 2  # measured: one was not better than two, and Python holds the interpreter's lock beyond
+WORKERS = (
+    3  # Python runs one at a time, and a processor more in NumPy; one is kept for hands that move
+)
 
 
 class Painter(Protocol):
@@ -89,16 +91,22 @@ class Room:
             self._ring(self, max(wait, BREATH))
 
 
+class Turn(NamedTuple):
+    """Whose turn comes first."""
+
+    place: float  # in the line: monotonic seconds
+    late: bool  # after a rest: such a turn may take long
+
+
 class Dispatcher:
-    """Serves rooms by a few worker threads, the longest waiting first."""
+    """Serves rooms by a few worker threads, the longest waiting first. One is never given a late turn."""
 
     def __init__(self, serve: Callable[[Any], None] = Room.serve, workers: int = WORKERS) -> None:
         self._serve = serve
         self._changed = threading.Condition()
-        self._waiting: dict[
-            Any, float
-        ] = {}  # since when, in monotonic seconds: the place in the line
-        self._served: set[Any] = set()
+        self._waiting: dict[Any, Turn] = {}
+        self._served: dict[Any, Turn] = {}
+        self._late_at_once = max(1, workers - 1)
         self._booked: dict[Any, float] = {}  # monotonic seconds of a later turn, at most one a room
         self._later: list[
             tuple[float, int, Any]
@@ -119,7 +127,8 @@ class Dispatcher:
             if after > 0:
                 self._book(room, now + after)
             else:
-                self._waiting[room] = min(now, self._waiting.get(room, now))
+                before = self._waiting.get(room)
+                self._waiting[room] = Turn(min(now, before.place) if before else now, late=False)
                 self._changed.notify()
 
     def close(self) -> None:
@@ -149,15 +158,14 @@ class Dispatcher:
                 if self._closed:
                     return
                 # before the state is read: a ring from here on is a new turn
-                del self._waiting[room]
-                self._served.add(room)
+                self._served[room] = self._waiting.pop(room)
             try:
                 self._serve(room)
             except Exception:  # perhaps its browser has just gone; the others need this worker
                 log.exception("a room could not be served")
             finally:
                 with self._changed:
-                    self._served.discard(room)  # who rang meanwhile is found by this worker
+                    del self._served[room]  # who rang meanwhile is found by this worker
 
     def _next(self) -> Any | None:
         now = time.monotonic()
@@ -165,8 +173,13 @@ class Dispatcher:
             due, _, room = heapq.heappop(self._later)
             if self._booked.get(room) == due:
                 del self._booked[room]
-                self._waiting.setdefault(room, due + YIELD)
-        waiting = (room for room in self._waiting if room not in self._served)
+                self._waiting.setdefault(room, Turn(due + YIELD, late=True))
+        late = sum(turn.late for turn in self._served.values()) < self._late_at_once
+        waiting = (
+            room
+            for room, turn in self._waiting.items()
+            if room not in self._served and late >= turn.late
+        )
         return min(waiting, key=self._waiting.__getitem__, default=None)
 
     def _until_later(self) -> float | None:

@@ -401,3 +401,37 @@ def test_what_fails_is_tried_again():
     with pytest.raises(ZeroDivisionError):
         kept.get("a", lambda: 1 // 0)
     assert kept.get("a", lambda: 2) == 2
+
+
+def test_who_makes_plots_for_long_keeps_nobody_elses_waiting(monkeypatch):
+    # functools.cached_property of Python 3.11 has one lock for all
+    made, go = threading.Event(), threading.Event()
+
+    def slow(state):
+        if state.distance == 0.5:
+            made.set()
+            assert go.wait(60)
+        raise ZeroDivisionError(str(state.distance))
+
+    monkeypatch.setattr(drawn, "plots_of", slow)
+    first, second = (
+        drawn.drawn(changed(DEFAULT, distance=metres), True, None) for metres in (0.5, 0.6)
+    )
+    errors = []
+
+    def ask():
+        try:
+            _ = first.curves
+        except ZeroDivisionError as error:
+            errors.append(str(error))
+
+    thread = threading.Thread(target=ask)
+    thread.start()
+    assert made.wait(60)
+    with pytest.raises(ZeroDivisionError, match=r"0\.6"):
+        _ = second.curves
+    assert not errors
+    go.set()
+    thread.join(60)
+    assert errors == ["0.5"]
+    assert first.cards is first.cards

@@ -196,6 +196,26 @@ def test_a_full_frame_lets_drafts_pass_but_not_for_ever(dispatchers, monkeypatch
     assert dispatcher._next() == "full"
 
 
+def test_late_turns_that_take_long_leave_a_worker_to_hands_that_move(dispatchers):
+    go, served = threading.Event(), []
+
+    def serve(name: str) -> None:
+        served.append(name)
+        if name.startswith("late"):
+            assert go.wait(SOON)
+
+    dispatcher = dispatchers(serve, workers=3)
+    for k in range(4):
+        dispatcher.ring(f"late {k}", 0.001)
+    until(lambda: len(served) == 2)
+    for k in range(20):
+        dispatcher.ring(f"hand {k}")
+        until(lambda k=k: f"hand {k}" in served)
+    assert sum(name.startswith("late") for name in served) == 2
+    go.set()
+    until(lambda: len(served) == 24)
+
+
 def test_close_finishes_who_is_served_and_drops_who_waits():
     started, go, done = threading.Event(), threading.Event(), []
 
