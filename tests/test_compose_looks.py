@@ -336,7 +336,7 @@ def test_a_pyramid_has_the_photographs_corners_and_stands_where_the_camera_does(
 def test_the_outline_is_the_visible_boundary_of_the_fitted_face():
     outline = composed(overlays=("outline",)).photo.outline
     assert outline is not None
-    boundary = fa.contours.occluding_boundary(MODEL, FACE.own_vertices, FIT.camera)
+    boundary = fa.boundary.occluding_boundary(MODEL, FACE.own_vertices, FIT.camera)
     seen = set(boundary.vertices[boundary.visible].tolist())
     edges = [e for e in boundary.edges.tolist() if set(e) <= seen]
     xy = project(FIT.camera, FACE.own_vertices) + OBSERVATION.centre

@@ -13,8 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Array
+from ..boundary import contour_points
 from ..camera import project
-from ..contours import ContourFit, contour_fit, contour_points
+from ..contours import ContourFit, contour_fit
 from ..fitting import Fit, fit
 from ..metrics import mean_gap_percent, surface_difference
 from ..model import FaceModel, Subject
