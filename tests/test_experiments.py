@@ -72,7 +72,8 @@ def test_the_algebraic_residual_brings_the_face_too_near_and_the_reprojection_do
 @pytest.mark.slow
 def test_separable_least_squares_beats_the_alternating_fit_on_heads_left_out(outcome):
     found = outcome("fig3a")
-    assert claims(found)["SNLS gives a lower surface error than ALS"]
+    lower = "SNLS gives a lower surface error than ALS (70 modes, no noise, after Procrustes with scale)"
+    assert claims(found)[lower]
     (table,) = found.tables
     assert all(ratio >= 1 for ratio in column(table, "cost of ALS / of SNLS"))
     frontal, turned = column(table, "with scale (%)")[:2]
