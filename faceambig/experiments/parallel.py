@@ -141,8 +141,9 @@ def _imported(name: str, extra: str) -> Any:
     try:
         return import_module(name)
     except ImportError as error:
-        package = {"batch": "'faceambig[batch]'", "dask": "'dask[distributed]'"}.get(extra, extra)
-        raise ValueError(f"backend: {name} is not installed; pip install {package}") from error
+        raise ValueError(
+            f"backend: {name} is not installed; pip install 'faceambig[{extra}]'"
+        ) from error
 
 
 def _chunk_of_worker(
