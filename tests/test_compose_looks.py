@@ -14,10 +14,10 @@ from faceambig.arrays import vertex_normals
 from faceambig.camera import Camera, depths, project
 from faceambig.compose.face import centre_of
 from faceambig.compose.overlays import BREAK, FARTHEST, LIFT, apex, station
+from faceambig.density import DistanceDensity
 from faceambig.flex import plausible_limit
 from faceambig.model import Subject
 from faceambig.observation import portrait_camera
-from faceambig.posterior import DistanceDensity
 from faceambig.render import overlay
 from faceambig.scene import Lines, Photo, Scene
 from strategies import bumpy_model, face_of
