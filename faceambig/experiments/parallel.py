@@ -10,6 +10,7 @@ from __future__ import annotations
 import gc
 import hashlib
 import os
+import warnings
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
@@ -93,6 +94,11 @@ def _run(
     joblib = _imported("joblib", "batch")
     with ExitStack() as stack:
         stack.enter_context(_backend(joblib, settings, stack))
+        # loky ends a process whose caches have grown by 300 MB, and starts another: nothing is lost, nobody need know
+        stack.enter_context(warnings.catch_warnings())
+        warnings.filterwarnings(
+            "ignore", "A worker stopped while some jobs were given", UserWarning
+        )
         work = joblib.delayed(_chunk_of_worker)
         calls = (work(k, part, function, model, digest) for k, part in jobs)
         if settings.backend != "ray":
