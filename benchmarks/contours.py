@@ -28,7 +28,7 @@ from timing import about, compare
 
 import faceambig as fa
 from faceambig.arrays import Array
-from faceambig.contours import contour_points, occluding_boundary
+from faceambig.boundary import contour_points, occluding_boundary
 from faceambig.metrics import surface_difference
 from faceambig.observation import portrait_camera
 from faceambig.visibility import visible_vertices

@@ -21,7 +21,8 @@ from problems import drawn, model_of_the_benchmarks
 from timing import about, compare
 
 import faceambig as fa
-from faceambig.flex import linearised, most_flexible
+from faceambig.flex import most_flexible
+from faceambig.linear import linearised
 from faceambig.surface import bending
 
 PHOTOGRAPHS = 8

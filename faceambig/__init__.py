@@ -11,7 +11,9 @@ After A. Bas and W. A. P. Smith, "What does 2D geometric information really tell
 
 from __future__ import annotations
 
+from .conditioned import condition
 from .contours import ContourFit, ContourStatus, contour_fit
+from .density import DistanceDensity, DistanceInterval
 from .errors import AssetError
 from .extremes import ExtremeFace, ExtremeFaces, extreme_faces
 from .fitting import Failure, Fit, FitOptions, Status, fit, fit_batch
@@ -19,14 +21,7 @@ from .flex import FlexibilityModes, KeptModes, flexibility_modes
 from .io import load_fit, load_landmarks, load_model, save_fit
 from .model import FaceModel, Scheme, Subject
 from .observation import Observation, observe
-from .posterior import (
-    DistanceDensity,
-    DistanceInterval,
-    FaceSamples,
-    Posterior,
-    condition,
-    posterior,
-)
+from .posterior import FaceSamples, Posterior, posterior
 from .shading import ExplainedShading, Light, explain_shading, shade
 from .spread import PosteriorModes, SurfaceSpread, posterior_modes, surface_spread
 from .sweep import Interval, Sweep, sweep_distance

@@ -85,6 +85,20 @@ def whole(name: str, value: object) -> int:
     return int(value)
 
 
+def positive(name: str, value: object) -> float:
+    """`value` as a float above 0 and finite."""
+    given = number(name, value)
+    if not 0 < given < np.inf:
+        raise ValueError(f"{name}: {given:g} is not above 0 and finite")
+    return given
+
+
+def one_of(name: str, value: object, known: Sequence[str]) -> None:
+    """ValueError unless `value` is one of the known words."""
+    if not isinstance(value, str) or value not in known:
+        raise ValueError(f"{name}: {shown(value)} is not {' or '.join(known)}")
+
+
 def shown(value: object) -> str:
     """`value` in at most 60 characters of one line, for an error message."""
     try:

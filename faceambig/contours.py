@@ -1,9 +1,8 @@
-"""Occluding contours: where the surface turns away from the camera, and fits to them (paper, section 5; MATH.md 5).
+"""Fits to contours, where the surface turns away from the camera (paper, section 5; MATH.md 5).
 
-The occluding boundary are the edges between a triangle that shows its outer and one that shows its inner side: the
-outline of the head and, inside it, of the nose or an ear before the cheek. What of it is visible is drawn in a picture
-as an edge, but which pixel belongs to which vertex is not known: nearest neighbours are paired, the face is fitted to
-landmarks and pairs together, and both are repeated. The pairs hardly ever come to rest, so the surface decides.
+What is visible of the occluding boundary (boundary.py) is drawn in a picture as an edge, but which pixel belongs to
+which vertex is not known: nearest neighbours are paired, the face is fitted to landmarks and pairs together, and both
+are repeated. The pairs hardly ever come to rest, so the surface decides.
 
 Contours help at the right distance, in the mean and as far as the model can make the face; at a wrong distance they
 pull it further from the truth (benchmarks/contours.py).
@@ -13,21 +12,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from functools import lru_cache
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from .arrays import Array, IntArray, checked, number, read_only, whole
-from .camera import Camera, project, see
+from .arrays import Array, IntArray, checked, number, positive, read_only, whole
+from .boundary import occluding_boundary
+from .camera import Camera, project
 from .fitting import Fit, FitOptions
 from .fitting.solve import Problem, Solution, cost
 from .fitting.task import Task, answer, kappa_of, prepare, solve_by, start_of
 from .model import FaceModel
 from .observation import LARGEST_PX, Observation
-from .visibility import visible_in
 
 SETTLED_MM = 0.05  # mean movement of the surface in one iteration that ends them
 WORST = 0.05  # share of the pairs that is dropped, those farthest apart
@@ -41,19 +39,6 @@ class ContourStatus(StrEnum):
     CYCLE = "cycle"  # a set of pairs returned; the fit of least cost among those in between is kept
     MAX_ITERATIONS = "iteration limit reached"
     NO_CONTOUR = "no contour found"  # no pair: the fit is that of the landmarks alone
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Boundary:
-    """Occluding boundary of a surface, as one camera sees it. Edges at the border of the mesh are none of it."""
-
-    edges: IntArray  # (K, 2) vertex numbers
-    vertices: IntArray  # (C,) of the edges, ascending
-    visible: NDArray[np.bool_]  # (C,) no part of the surface lies in front
-
-    def __post_init__(self) -> None:
-        for name in ("edges", "vertices", "visible"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,61 +87,6 @@ class ContourFit:
             principal_point=(float(seen.centre[0]), float(seen.centre[1])),
             weights=np.concatenate([weights, np.full(len(self.pairs), self.pair_weight)]),
         )
-
-
-def occluding_boundary(model: FaceModel, vertices: ArrayLike, camera: Camera) -> Boundary:
-    """The occluding boundary of a surface `vertices` (N, 3), metres, of the model, under either camera.
-
-    Outer and inner parts alike. An edge belongs to it if its two triangles look opposite ways along the ray from the
-    camera: their areas in the picture differ in sign. Edges of one triangle, the border of the mesh, do not, nor does
-    an edge that touches them: a picture of a whole head shows nothing there.
-    """
-    points = checked("vertices", vertices, (model.n_vertices, 3))
-    seen = see(camera.view, points)
-    corners = np.ascontiguousarray(seen.xy.T)[:, model.faces]  # (2, F, 3)
-    one, two = (corners[..., k] - corners[..., 0] for k in (1, 2))
-    outside = one[0] * two[1] - one[1] * two[0] < 0  # y counts down, triangles are wound outward
-    edges, triangles = inner_edges(model)
-    on = outside[triangles]
-    edges = edges[on[:, 0] != on[:, 1]]
-    flags = np.zeros(model.n_vertices, dtype=bool)
-    flags[edges] = True
-    found = flags.nonzero()[0]
-    return Boundary(edges, found, visible_in(seen, camera, model.faces, found))
-
-
-def contour_points(model: FaceModel, vertices: ArrayLike, camera: Camera) -> Array:
-    """Points (n, 2) along the visible occluding boundary, a quarter of a pixel apart; pixels from the principal point.
-
-    What a perfect edge detector sees of a surface `vertices` (N, 3): for pictures, and to test with.
-    """
-    boundary = occluding_boundary(model, vertices, camera)
-    seen = np.zeros(model.n_vertices, dtype=bool)
-    seen[boundary.vertices[boundary.visible]] = True
-    ends = boundary.edges[seen[boundary.edges].all(axis=1)]
-    xy = project(camera, np.asarray(vertices, dtype=np.float64))
-    start, way = xy[ends[:, 0]], xy[ends[:, 1]] - xy[ends[:, 0]]
-    number = 1 + np.ceil(4 * np.linalg.norm(way, axis=1)).astype(np.intp)
-    row = np.repeat(np.arange(len(number)), number)
-    place = np.arange(len(row)) - (np.cumsum(number) - number)[row]
-    return start[row] + (place / (number - 1).clip(1)[row])[:, None] * way[row]
-
-
-@lru_cache(maxsize=8)
-def inner_edges(model: FaceModel) -> tuple[IntArray, IntArray]:
-    """Edges (E, 2) away from the border of the mesh, and the two triangles (E, 2) of each."""
-    faces = model.faces.astype(np.intp)
-    ends = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
-    name = ends[:, 0] * model.n_vertices + ends[:, 1]
-    order = np.argsort(name, kind="stable")
-    _, first, count = np.unique(name[order], return_index=True, return_counts=True)
-    border = np.zeros(model.n_vertices, dtype=bool)
-    border[ends[order[first[count != 2]]]] = True
-    first = first[count == 2]
-    edges = ends[order[first]]
-    triangles = np.stack([order[first], order[first + 1]], axis=1) % len(faces)
-    inner = ~border[edges].any(axis=1)
-    return read_only(edges[inner]), read_only(triangles[inner])
 
 
 def contour_fit(
@@ -209,31 +139,9 @@ def contour_fit(
     if camera == "perspective" and distance is None:
         task = replace(task, problem=replace(task.problem, free_distance=True))
     start = solve_by(task.problem, *start_of(task, kappa), options)
-
     tree = cKDTree(pixels - observation.centre)
-    rounds: list[_Round] = []
-    movement: list[float] = []
-    best, surface, status = start, model.vertices(start.alpha), ContourStatus.MAX_ITERATIONS
-    for _ in range(most):
-        vertices, rows = match(model, surface, best.camera, tree, reach)
-        if not len(vertices):
-            status, best, rounds = ContourStatus.NO_CONTOUR, start, []
-            break
-        name = vertices.tobytes() + rows.tobytes()
-        again = next((i for i, each in enumerate(rounds) if each.name == name), None)
-        if again is not None:
-            rounds = rounds[again:]
-            status = ContourStatus.CYCLE if len(rounds) > 1 else ContourStatus.SETTLED
-            break
-        problem = _with_pairs(task, model, vertices, tree.data[rows], pair_weight)
-        best = solve_by(problem, best.camera, best.alpha, options)
-        rounds.append(_Round(name, vertices, rows, best))
-        before, surface = surface, model.vertices(best.alpha)
-        movement.append(1e3 * float(np.linalg.norm(surface - before, axis=1).mean()))
-        if movement[-1] < SETTLED_MM:
-            status = ContourStatus.SETTLED
-            break
-    pairs = Pairs(np.zeros(0, dtype=np.intp), np.zeros((0, 2)))
+    status, rounds, movement = _iterated(task, start, tree, reach, pair_weight, most)
+    best, pairs = start, Pairs(np.zeros(0, dtype=np.intp), np.zeros((0, 2)))
     if rounds:
         one = rounds[-1]
         if status is ContourStatus.CYCLE:
@@ -248,6 +156,36 @@ class _Round(NamedTuple):
     vertices: IntArray  # (P,)
     rows: IntArray  # (P,) of the edges
     solution: Solution
+
+
+def _iterated(
+    task: Task, start: Solution, tree: cKDTree, reach: float, weight: float, most: int
+) -> tuple[ContourStatus, list[_Round], list[float]]:
+    """Rounds of pairing and fitting from the fit to the landmarks on, and the surface's movements, mm.
+
+    Of a cycle the rounds that return; none where there is no contour.
+    """
+    model, best, surface = task.model, start, task.model.vertices(start.alpha)
+    rounds: list[_Round] = []
+    movement: list[float] = []
+    for _ in range(most):
+        vertices, rows = match(model, surface, best.camera, tree, reach)
+        if not len(vertices):
+            return ContourStatus.NO_CONTOUR, [], movement
+        name = vertices.tobytes() + rows.tobytes()
+        again = next((i for i, each in enumerate(rounds) if each.name == name), None)
+        if again is not None:
+            rounds = rounds[again:]
+            ended = ContourStatus.CYCLE if len(rounds) > 1 else ContourStatus.SETTLED
+            return ended, rounds, movement
+        problem = _with_pairs(task, model, vertices, tree.data[rows], weight)
+        best = solve_by(problem, best.camera, best.alpha, task.options)
+        rounds.append(_Round(name, vertices, rows, best))
+        before, surface = surface, model.vertices(best.alpha)
+        movement.append(1e3 * float(np.linalg.norm(surface - before, axis=1).mean()))
+        if movement[-1] < SETTLED_MM:
+            return ContourStatus.SETTLED, rounds, movement
+    return ContourStatus.MAX_ITERATIONS, rounds, movement
 
 
 def match(
@@ -304,7 +242,4 @@ def _edges(edges: ArrayLike) -> Array:
 def _reach(max_distance_px: float | None, task: Task) -> float:
     if max_distance_px is None:
         return FARTHEST_PERCENT / 100 * task.interocular_px
-    reach = number("max_distance_px", max_distance_px)
-    if not 0 < reach < np.inf:
-        raise ValueError(f"max_distance_px: {reach:g} is not above 0 and finite")
-    return reach
+    return positive("max_distance_px", max_distance_px)

@@ -4,7 +4,7 @@ With landmark noise of sd sigma px per coordinate and alpha ~ N(0, I) the face's
 
     P = Pi^T Pi / sigma^2 + I,
 
-Pi as in flex.py and with the pose's part taken out where the pose is free: under a flat prior that is the Schur
+Pi as in linear.py and with the pose's part taken out where the pose is free: under a flat prior that is the Schur
 complement of the joint precision, the pose integrated away. G f = nu P f with f^T P f = 1 gives independent directions,
 P^-1 = F F^T: f is one standard deviation, nu = |Q f|^2 its share of the surface's variance. Surfaces are compared in
 the model's own axes, not aligned: with the pose free, size and slant belong to what is unknown.
@@ -18,18 +18,11 @@ from typing import Literal, get_args
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, eigh
 
-from .arrays import Array, read_only, shown
+from .arrays import Array, positive, read_only, shown
 from .fitting import Fit
-from .flex import (
-    Linear,
-    check_fit,
-    continued,
-    count_of,
-    linearised,
-    pose_columns,
-    positive,
-    without_pose,
-)
+from .fitting.checks import check_fit
+from .flex import continued, count_of
+from .linear import Linear, linearised, pose_columns, without_pose
 from .model import FaceModel
 from .surface import bending, evaluation_modes, gram, sign, words
 

@@ -14,10 +14,10 @@ from faceambig.arrays import vertex_normals
 from faceambig.camera import Camera, depths, project
 from faceambig.compose.face import centre_of
 from faceambig.compose.overlays import BREAK, FARTHEST, LIFT, apex, station
+from faceambig.density import DistanceDensity
 from faceambig.flex import plausible_limit
 from faceambig.model import Subject
 from faceambig.observation import portrait_camera
-from faceambig.posterior import DistanceDensity
 from faceambig.render import overlay
 from faceambig.scene import Lines, Photo, Scene
 from strategies import bumpy_model, face_of
@@ -336,7 +336,7 @@ def test_a_pyramid_has_the_photographs_corners_and_stands_where_the_camera_does(
 def test_the_outline_is_the_visible_boundary_of_the_fitted_face():
     outline = composed(overlays=("outline",)).photo.outline
     assert outline is not None
-    boundary = fa.contours.occluding_boundary(MODEL, FACE.own_vertices, FIT.camera)
+    boundary = fa.boundary.occluding_boundary(MODEL, FACE.own_vertices, FIT.camera)
     seen = set(boundary.vertices[boundary.visible].tolist())
     edges = [e for e in boundary.edges.tolist() if set(e) <= seen]
     xy = project(FIT.camera, FACE.own_vertices) + OBSERVATION.centre

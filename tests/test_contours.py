@@ -11,14 +11,9 @@ import pytest
 from scipy.spatial import cKDTree
 
 import faceambig as fa
+from faceambig.boundary import contour_points, inner_edges, occluding_boundary
 from faceambig.camera import Camera, project
-from faceambig.contours import (
-    SETTLED_MM,
-    contour_points,
-    inner_edges,
-    match,
-    occluding_boundary,
-)
+from faceambig.contours import SETTLED_MM, match
 from faceambig.fitting.task import landmark_rows
 from faceambig.io.pictures import canny_edges
 from faceambig.metrics import surface_difference

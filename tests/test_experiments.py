@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from functools import cache, partial
 from typing import Any
@@ -72,7 +73,8 @@ def test_the_algebraic_residual_brings_the_face_too_near_and_the_reprojection_do
 @pytest.mark.slow
 def test_separable_least_squares_beats_the_alternating_fit_on_heads_left_out(outcome):
     found = outcome("fig3a")
-    assert claims(found)["SNLS gives a lower surface error than ALS"]
+    lower = "SNLS gives a lower surface error than ALS (70 modes, no noise, after Procrustes with scale)"
+    assert claims(found)[lower]
     (table,) = found.tables
     assert all(ratio >= 1 for ratio in column(table, "cost of ALS / of SNLS"))
     frontal, turned = column(table, "with scale (%)")[:2]
@@ -258,10 +260,13 @@ def test_only_what_can_be_told_apart_by_its_words_is_an_item(embedded, tmp_path)
         parallel.over_subjects(WORK, [np.array([1])], settings, silent)  # type: ignore[list-item]
 
 
-def test_a_backend_that_is_not_there_is_told(embedded):
+def test_a_backend_that_is_not_there_is_told(embedded, monkeypatch):
     settings = Settings(tiny_model(seed=1), "tiny", n_jobs=0)
     with pytest.raises(ValueError, match="n_jobs: 0 is no number of processes"):
         parallel.over_subjects(WORK, [1], settings, silent)
+    monkeypatch.setitem(sys.modules, "ray", None)
+    with pytest.raises(ValueError, match=r"ray is not installed; pip install 'faceambig\[ray\]'"):
+        parallel.over_subjects(WORK, [1], replace(settings, n_jobs=2, backend="ray"), silent)
     wrong = Settings(embedded, "embedded", backend="spark", n_jobs=2)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="backend: 'spark' is not loky, dask or ray"):
         parallel.over_subjects(WORK, [1], wrong, silent)

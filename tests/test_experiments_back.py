@@ -176,7 +176,7 @@ def test_contours_at_a_wrong_distance_do_not_help_every_face(embedded):
 
 def test_the_figures_are_drawn_and_say_what_fails(embedded):
     outcome = quick(embedded, "fig6")
-    assert [image.pixels.shape for image in outcome.images] == [(796, 1480, 3)] * 2
+    assert [image.pixels.shape for image in outcome.images] == [(1223, 1480, 3)] * 2
     assert not outcome.claims[0].holds
     assert "below 1 %" in outcome.claims[0].words
     assert len(outcome.tables[1].rows) == 4

@@ -13,7 +13,8 @@ from scipy.optimize import minimize
 
 import faceambig as fa
 from faceambig.camera import Camera, project
-from faceambig.extremes import Marks, upper_bound
+from faceambig.extremes.dual import upper_bound
+from faceambig.extremes.marks import Marks
 from faceambig.fitting.solve import moved_camera
 from faceambig.flex import gram
 from strategies import face_of, tiny_model

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import scenes
-from faceambig.render import gl
+from faceambig.render import gl, studio
 from faceambig.scene import Head, View
 
 TESTS = Path(__file__).parent
@@ -82,13 +82,13 @@ def test_lights_are_summed_in_one_order():
         return [node.light.intensity for node in gl._scene(pyrender, mesh, (0.1, 0.1)).light_nodes]
 
     for _ in range(5):
-        assert gl._studio().call(intensities) == [intensity for _, _, intensity in gl.LIGHTS]
+        assert studio.studio().call(intensities) == [intensity for _, _, intensity in gl.LIGHTS]
 
 
 @draws
 @pytest.mark.slow
 def test_osmesa_and_egl_give_the_same_picture(tmp_path):
-    names = [n for n in gl.LIBRARIES if all(map(gl._loads, gl.LIBRARIES[n]))]
+    names = [n for n in studio.LIBRARIES if all(map(studio.loads, studio.LIBRARIES[n]))]
     if len(names) < 2:
         pytest.skip(f"only {names[0]} is installed")
     code = """
@@ -245,7 +245,7 @@ def test_an_error_reaches_the_caller_and_the_thread_lives_on():
         raise KeyError("here")
 
     with pytest.raises(KeyError, match="here"):
-        gl._studio().call(fails)
+        studio.studio().call(fails)
     assert gl.render_head(patch((9, 9, 9)), FRONT, 8, 8, 100.0).shape == (8, 8, 4)
 
 
@@ -277,7 +277,7 @@ def test_without_a_renderer_one_line_says_what_to_install(monkeypatch):
     with pytest.raises(
         gl.NoRendererError, match=r"^no software renderer: sudo apt-get install \S+.*$"
     ) as caught:
-        gl._studio.__wrapped__()
+        studio.studio.__wrapped__()
     assert "\n" not in str(caught.value)
 
 

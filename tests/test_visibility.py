@@ -38,7 +38,7 @@ def test_every_vertex_of_a_bumpy_shell_is_as_traced(case):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["ict", "embedded"])
 def test_contour_vertices_of_a_head_are_as_traced(name, request):
-    from faceambig.contours import occluding_boundary
+    from faceambig.boundary import occluding_boundary
 
     model, rng = request.getfixturevalue(name), np.random.default_rng(5)
     asked = hidden = 0

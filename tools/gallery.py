@@ -21,8 +21,8 @@ import numpy as np
 
 import faceambig as fa
 from faceambig import compose
+from faceambig.boundary import occluding_boundary
 from faceambig.camera import project
-from faceambig.contours import occluding_boundary
 from faceambig.io.pictures import canny_edges, read_picture
 from faceambig.observation import portrait_camera
 from faceambig.render import painter

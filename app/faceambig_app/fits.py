@@ -12,8 +12,8 @@ from typing import NamedTuple, TypedDict
 
 import faceambig as fa
 from faceambig.arrays import Array
+from faceambig.boundary import contour_points
 from faceambig.camera import Camera
-from faceambig.contours import contour_points
 from faceambig.model import FaceModel, Subject
 from faceambig.observation import portrait_camera
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -44,6 +43,7 @@ from .face import (
     with_density,
 )
 from .heads import HALF_HEIGHT, SPACING, VIEWS, head, named_view, pivot
+from .look import HIDEABLE, SHOWS, Look, look_of
 from .overlays import BREAK, OVERLAYS, Station, marks, pyramid, rays, station
 from .picture import outline, photo, photo_of_fit, with_fit
 from .row import PINS, SCALE_BAR, compose_pins, compose_row
@@ -91,24 +91,10 @@ __all__ = [
     "with_fit",
 ]
 
-SHOWS = ("both", "overlay", "blink", "difference")
-HIDEABLE = ("numbers", "truth", "actual")
 ERROR_SCALES = (1.0, 5.0, 10.0, 20.0)
 GHOST_OPACITY = 0.45
 FADED_IN = 0.75  # fade at which the true face is solid over the fitted one, which then goes
 MARGIN = 0.02  # metres between a drawn camera and the edge of the picture
-
-
-class Look(NamedTuple):
-    """What was asked to be drawn, checked."""
-
-    view: str
-    show: str
-    surface: str  # that is drawn
-    overlays: frozenset[str]
-    hide: frozenset[str]
-    fade: float
-    true_camera: Camera | None
 
 
 def compose(
@@ -157,24 +143,22 @@ def compose(
     ------
     ValueError: a name that is none, a number out of range, or what an overlay or surface needs is missing.
     """
-    look = _asked(view, show, surface, overlays, hide, fade, true_camera)
+    look = look_of(view, show, surface, overlays, hide, fade, true_camera)
     colours = _colours(subject, face, look, spread_mm)
-    heads = _heads(subject, face, look, titles, colours)
-    if (values := _values(subject, face, look, spread_mm)) is not None:
-        heads = tuple(replace(one, values_mm=values) if one.name == "fit" else one for one in heads)
+    heads = _valued(
+        _heads(subject, face, look, titles, colours), _values(subject, face, look, spread_mm)
+    )
     lines = () if view == "camera" else tuple(_lines(subject, face, look, picture))
-    told = curve
     if curve is not None and "actual" in look.hide:
-        told = replace(curve, true_distance=np.nan)
-    valued = look.surface in LEGENDS
+        curve = replace(curve, true_distance=np.nan)
     return Scene(
         heads=heads,
         views=(_view(look, orbit, zoom, subject, lines),),
         photo=_picture(picture, face, look, error_scale),
         pivot=pivot(subject.model),
         numbers=numbers(face, reference=reference),
-        curves=told,
-        legend=LEGENDS[look.surface](*legend_words) if valued else None,
+        curves=curve,
+        legend=LEGENDS[look.surface](*legend_words) if look.surface in LEGENDS else None,
         through_camera=view == "camera",
         blink=look.show == "blink" and len(heads) > 1,
         marks=_marks(subject, face, look),
@@ -185,49 +169,13 @@ def compose(
     )
 
 
-def _asked(
-    view: str,
-    show: str,
-    surface: str,
-    overlays: Collection[str],
-    hide: Collection[str],
-    fade: float,
-    true_camera: Camera | None,
-) -> Look:
-    """The arguments of compose, checked; what is hidden or means nothing in this view is taken out."""
-    for name, values, known in (
-        ("show", (show,), SHOWS),
-        ("surface", (surface,), SURFACES),
-        ("overlays", overlays, OVERLAYS),
-        ("hide", hide, HIDEABLE),
-    ):
-        for value in values:
-            if value not in known:
-                raise ValueError(f"{name}: {value!r} is not one of {', '.join(known)}")
-    fade = number("fade", fade)
-    if not 0 <= fade <= 1:
-        raise ValueError(f"fade: {fade:g} is not within 0 to 1")
-    drawn = shown_surface(surface, show, hide)
-    shown = frozenset(overlays)
-    needy = [name for name in ("rays", "pyramid") if name in shown and view != "camera"]
-    if "truth" in hide:
-        needy = []
-    if true_camera is None and (drawn == "depth" or needy):
-        what = "surface: 'depth'" if drawn == "depth" else f"overlays: {needy[0]!r}"
-        raise ValueError(f"{what} needs the camera that took the photograph; give true_camera")
-    one_place = show in ("overlay", "blink") and view != "camera" and "truth" not in hide
-    return Look(
-        view, show if one_place else "both", drawn, shown, frozenset(hide), fade, true_camera
-    )
-
-
 def _colours(subject: Subject, face: Face, look: Look, spread_mm: Array | None) -> Colours:
     """(N, 3) sRGB of the fitted head."""
     model = subject.model
     if look.surface == "difference":
         return difference_colours(model, face.gaps_mm)
     if look.surface == "depth":
-        assert look.true_camera is not None  # _asked refuses
+        assert look.true_camera is not None  # look_of refuses
         return depth_colours(model, depth_change_mm(subject, face, look.true_camera))
     if look.surface == "spread":
         if spread_mm is None:
@@ -244,6 +192,13 @@ def _values(subject: Subject, face: Face, look: Look, spread_mm: Array | None) -
     if look.surface == "depth" and look.true_camera is not None:
         return over_region(subject.model, depth_change_mm(subject, face, look.true_camera))
     return spread_mm if look.surface == "spread" else None
+
+
+def _valued(heads: tuple[Head, ...], values: Array | None) -> tuple[Head, ...]:
+    """The heads, the fitted one with its values (N,) if it has any."""
+    if values is None:
+        return heads
+    return tuple(replace(one, values_mm=values) if one.name == "fit" else one for one in heads)
 
 
 def _heads(

@@ -15,12 +15,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Array, checked
 from ..camera import Camera, project
+from ..density import DistanceDensity
 from ..fitting import Fit
 from ..flex import FlexibilityModes
 from ..metrics import HUMAN_TOLERANCE_PERCENT, mean_gap_percent, surface_difference
 from ..model import FaceModel, Subject
 from ..observation import Observation
-from ..posterior import DistanceDensity
 from ..scene import Curves, Numbers
 from ..sweep import Sweep
 

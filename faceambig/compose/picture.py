@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array
+from ..boundary import occluding_boundary
 from ..camera import Camera, camera_points, project
-from ..contours import occluding_boundary
 from ..fitting import Fit
 from ..model import Subject
 from ..observation import Observation

@@ -25,6 +25,7 @@ FAR = 12.0  # metres: heads are looked at through a long lens
 GROUND = 0xE6
 TALL = 0.33  # metres from the upper to the lower edge of a picture of a head
 LABEL, GAP, WHITE = 26, 8, (0xFF, 0xFF, 0xFF)
+READ_AT = 1000  # pixels a picture is shown wide, if larger: its words are 14 pixels high there
 SUB = 4  # fractional bits of OpenCV's drawing
 
 
@@ -99,13 +100,16 @@ def labelled(rows: Sequence[Sequence[tuple[str, Pixels]]]) -> Pixels:
     """(H, W, 3): pictures of one size in rows, with words above each."""
     tall, wide = rows[0][0][1].shape[:2]
     columns = max(len(row) for row in rows)
-    size = (columns * (wide + GAP) + GAP, len(rows) * (tall + LABEL + GAP) + GAP)
+    larger = max(1.0, columns * wide / READ_AT)
+    label = round(LABEL * larger)
+    size = (columns * (wide + GAP) + GAP, len(rows) * (tall + label + GAP) + GAP)
     canvas = Canvas(size, 1.0, WHITE)
     for i, row in enumerate(rows):
         for j, (words, picture) in enumerate(row):
-            x, y = GAP + j * (wide + GAP), GAP + i * (tall + LABEL + GAP)
-            canvas.text(x + wide / 2, y + 18, words, 14, INK, anchor="middle", most=wide)
-            canvas.paste(x, y + LABEL, picture)
+            x, y = GAP + j * (wide + GAP), GAP + i * (tall + label + GAP)
+            at = (x + wide / 2, y + 0.7 * label)
+            canvas.text(*at, words, 14 * larger, INK, anchor="middle", most=wide)
+            canvas.paste(x, y + label, picture)
     return canvas.pixels
 
 

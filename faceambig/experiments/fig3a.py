@@ -161,6 +161,7 @@ def _chart(d_s: Array, words: str) -> Chart:
 
 def _claims(mean: Array, nearer: Array, cost: Array) -> tuple[Claim, ...]:
     gain = 100 * (1 - mean[:, 1] / mean[:, 0])  # (cases, 2)
+    most = bool((nearer[: TURNED + 1, 1] > 50).all())
     lower = bool((cost[:, :, 1] <= cost[:, :, 0] * (1 + 1e-9)).all())
     others = [k for k in range(len(CASES)) if CASES[k].turned and CASES[k].noise == 0]
     by_modes = ", ".join(
@@ -176,11 +177,11 @@ def _claims(mean: Array, nearer: Array, cost: Array) -> tuple[Claim, ...]:
     noisy = mean[NOISY, :, 1]
     return (
         Claim(
-            "SNLS gives a lower surface error than ALS",
+            f"SNLS gives a lower surface error than ALS ({MOST_MODES} modes, no noise, after Procrustes with scale)",
             "0.73 against 1.01 mm, about 30 % less",
             f"frontal {told(FRONTAL)}, turned {told(TURNED)}",
             bool((gain[: TURNED + 1, 1] > 0).all()),
-            "Judged after Procrustes with scale: an orthographic picture does not show the size, and without a prior "
+            "With scale, since an orthographic picture does not show the size, and without a prior "
             f"nothing holds it. A matter of the number of modes, too: turned heads {by_modes}. "
             "Modes that are left out are noise to the fit, and rounds that stop early follow noise less. "
             "Run on, ALS reaches the same optimum.",
@@ -190,7 +191,7 @@ def _claims(mean: Array, nearer: Array, cost: Array) -> tuple[Claim, ...]:
             "100 %",
             f"{nearer[FRONTAL, 1]:.0f} % frontal, {nearer[TURNED, 1]:.0f} % turned",
             bool((nearer[: TURNED + 1, 1] == 100).all()),
-            f"For most of them {'it does' if (nearer[: TURNED + 1, 1] > 50).all() else 'it does not either'}. In cost "
+            f"For most of them it {'does' if most else 'does not hold either'}. In cost "
             f"SNLS is {'never' if lower else 'not always'} above ALS; the lower cost is not always the nearer face.",
         ),
         Claim(

@@ -87,7 +87,8 @@ def _chart(excess: Array) -> Chart:
         for k, at in enumerate(DISTANCES)
     )
     return Chart(
-        "Cost above its least, relative (median over the heads)", "iterations after SNLS", "excess",
+        "Cost above its least, relative (median over the heads)", "iterations after SNLS",
+        f"excess, {FLOOR:.0e} at least",
         lines, log_y=True,
     )  # fmt: skip
 

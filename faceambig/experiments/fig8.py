@@ -111,10 +111,13 @@ def run(settings: Settings, progress: Progress) -> Outcome:
         (picture(seen[0], found[0]),),
         claims(seen, found, bool(archive)),
         {
-            "people": n,
-            "seed": settings.seed,
-            "archive": archive or "",
-            "noise_percent": NOISE_PERCENT,
+            "people": f"{n} of {archive}"
+            if archive
+            else f"{n}, drawn from all modes, seed {settings.seed}",
+            "noise": "the archive's own"
+            if archive
+            else f"none, or {NOISE_PERCENT:g} % per coordinate",
+            "compared": "after the best shift, turn and scale; percent of the distance of the eyes",
         },
     )
 
@@ -208,7 +211,7 @@ def chart(seen: Seen, found: Statistics) -> Chart:
     return Chart(
         f"{seen.name}: a person from {x[0]:.0f} cm and farther away; others from {x[0]:.0f} cm",
         "distance of the second picture in cm",
-        "mean landmark distance in %",
+        "mean landmark distance in %; band: 80 % of the people",
         (own, Line("the nearest other", x, flat)),
     )
 

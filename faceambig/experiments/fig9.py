@@ -67,7 +67,8 @@ class Pictures(NamedTuple):
     far: list[Observation]
     distances: tuple[float, float]
     noise_percent: float  # that the fits assume
-    source: str
+    people: str
+    source: str  # these people in these pictures
 
 
 def run(settings: Settings, progress: Progress) -> Outcome:
@@ -106,8 +107,8 @@ def run(settings: Settings, progress: Progress) -> Outcome:
                     f"nearest other, both {a}, mm", f"nearest other, both {b}, mm",
                 ),
                 tuple(rows),
-                f"{pictures.source}; rigid mean distance over {MEASURED} vertices; "
-                "recognised by the cosine between the shapes' coefficients",
+                f"{pictures.people}; rigid mean distance over {MEASURED} vertices; area: between cosines",
+                decimals=3,
             ),
         ),
         (
@@ -119,9 +120,11 @@ def run(settings: Settings, progress: Progress) -> Outcome:
         tuple(images),
         claims(rows),
         {
-            "people": len(pictures.near), "noise_percent": pictures.noise_percent, "assumed_m": ASSUMED,
-            "seed": settings.seed, "regressor": settings.extra.get("regressor", ""),
-            "archive": settings.extra.get("archive", ""),
+            "people": f"{len(pictures.near)}; {pictures.people}",
+            "fit": "70 modes, box 2 sd, a prior that knows the noise",
+            "recognised": "by the cosine between the shapes' coefficients",
+            **settings.extra,
+            "seed": settings.seed,
         },
     )  # fmt: skip
 
@@ -147,8 +150,8 @@ def synthetic(settings: Settings, noise: float) -> Pictures:
         z = noisy(z * (EYES_PX / eye_unit(z, points)[:, None]), points, noise, rng)
         xy = np.stack([z.real, z.imag], axis=2)
         rows.append([Observation(x, scheme.name, principal_point=(0.0, 0.0)) for x in xy])
-    source = f"random people of the model, {points.name}, noise {noise:g} %"
-    return Pictures(rows[0], rows[1], (NEAR, FAR), noise, source)
+    people = f"random people of the model, {points.name}"
+    return Pictures(rows[0], rows[1], (NEAR, FAR), noise, people, f"{people}, noise {noise:g} %")
 
 
 def archived(settings: Settings) -> Pictures:
@@ -165,7 +168,8 @@ def archived(settings: Settings) -> Pictures:
     whole = portraits.detected[np.isfinite(portraits.detected).all(axis=(1, 2, 3))]
     rows = [[Observation(x, "ibug68") for x in whole[:, d]] for d in (0, -1)]
     ends = (float(portraits.distances[0]), float(portraits.distances[-1]))
-    return Pictures(rows[0], rows[1], ends, DETECTOR, f"{portraits.name}, 68 detected points")
+    people = f"{portraits.name}, 68 detected points"
+    return Pictures(rows[0], rows[1], ends, DETECTOR, people, people)
 
 
 def fitted(
@@ -287,7 +291,7 @@ def claims(rows: list[tuple[str | int | float | None, ...]]) -> tuple[Claim, ...
             f"{known:.3f} against {taken:.3f} ({TAKEN}) and {free:.3f} ({FREE})",
             known > taken and known > free,
             "Smaller differences here: the people are the model's own, without expressions, and so easy to tell apart "
-            "that with 1 % of noise nobody is mistaken.",
+            "that with 1 % of noise nobody is mistaken. A free distance comes out near the true one: it loses little.",
         ),
         Claim(
             "Without the distance a person's two faces are farther apart than those of another person at one distance",

@@ -10,6 +10,7 @@ from __future__ import annotations
 import gc
 import hashlib
 import os
+import warnings
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
@@ -93,6 +94,11 @@ def _run(
     joblib = _imported("joblib", "batch")
     with ExitStack() as stack:
         stack.enter_context(_backend(joblib, settings, stack))
+        # loky ends a process whose caches have grown by 300 MB, and starts another: nothing is lost, nobody need know
+        stack.enter_context(warnings.catch_warnings())
+        warnings.filterwarnings(
+            "ignore", "A worker stopped while some jobs were given", UserWarning
+        )
         work = joblib.delayed(_chunk_of_worker)
         calls = (work(k, part, function, model, digest) for k, part in jobs)
         if settings.backend != "ray":
@@ -141,8 +147,9 @@ def _imported(name: str, extra: str) -> Any:
     try:
         return import_module(name)
     except ImportError as error:
-        package = {"batch": "'faceambig[batch]'", "dask": "'dask[distributed]'"}.get(extra, extra)
-        raise ValueError(f"backend: {name} is not installed; pip install {package}") from error
+        raise ValueError(
+            f"backend: {name} is not installed; pip install 'faceambig[{extra}]'"
+        ) from error
 
 
 def _chunk_of_worker(

@@ -84,7 +84,11 @@ def run(settings: Settings, progress: Progress) -> Outcome:
         ),
         (),
         claims(rows, len(numbers)),
-        {"people": numbers[-1], "asked": ASKED, "seed": settings.seed, "points": points.name},
+        {
+            "people": f"{numbers[-1]}, drawn from all modes, seed {settings.seed}; {ASKED} of them are looked for",
+            "points": points.name,
+            "compared": "after the best shift, turn and scale",
+        },
     )  # fmt: skip
 
 

@@ -21,7 +21,7 @@ from .protocol import Chart, Claim, Experiment, Image, Line, Outcome, Progress, 
 DISTANCES = (0.3, 0.6, 1.2, 2.4, None)  # metres; None: orthographic
 # Noise that the prior assumes, percent of the eye distance. The paper's "low weight" is 0.1 px at 100 px between the
 # eyes; that of `fit` is its default
-PRIORS = {"light, as the paper's": 0.1, "default": 1.0}
+PRIORS = {"the paper's light": 0.1, "default": 1.0}
 LIGHT, DEFAULT = 0, 1
 SEEN, ASSUMED = (0.3, 1.2), (0.3, 0.6, 0.9, 1.2, 2.4)  # Fig. 5, metres
 SITTER = 3  # of Fig. 5
@@ -124,7 +124,7 @@ def _chart(d_s: NDArray[Any], prior: int) -> Chart:
         lines.append(Line(f"taken from {cm(actual)}", x, tuple(mean.tolist()), low, high))
     return Chart(
         f"Surface difference against the assumed distance ({list(PRIORS)[prior]} prior)",
-        "assumed distance", "d_S (mm)", tuple(lines), ticks=tuple(cm(d) for d in DISTANCES),
+        "assumed distance", "d_S (mm); band: standard error", tuple(lines), ticks=tuple(cm(d) for d in DISTANCES),
     )  # fmt: skip
 
 

@@ -12,6 +12,7 @@ from ..camera import Camera, depths, project
 from ..model import FaceModel, Scheme
 from ..observation import FLATTEST, MIN_POINTS, Observation, eye_distance
 from .als import solve_alternating
+from .checks import check_model
 from .result import Fit, FitOptions
 from .separable import solve_separable
 from .solve import Problem, Solution, solve
@@ -42,8 +43,7 @@ class Task:
 
 def prepare(model: FaceModel, observation: Observation, options: FitOptions) -> Task:
     """Visible points, their rows of the model, the prior's weight in px^2; ValueError if they do not match."""
-    if not isinstance(model, FaceModel):
-        raise ValueError(f"model: {shown(model)} is not a FaceModel; load one with load_model")
+    check_model(model)
     if not isinstance(observation, Observation):
         raise ValueError(f"observation: {shown(observation)} is not an Observation")
     visible = observation.visible

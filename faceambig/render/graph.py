@@ -192,4 +192,6 @@ def _dash(k: int) -> tuple[float, float] | None:
 
 def _number(value: float) -> str:
     """A tick's number, without needless digits."""
-    return f"{value:.0e}" if value != 0 and not 1e-4 <= abs(value) < 1e6 else f"{value:.4g}"
+    if value != 0 and not 1e-4 <= abs(value) < 1e6:
+        return f"{value:.0e}"
+    return f"{value:.0f}" if abs(value) >= 1e4 else f"{value:.4g}"

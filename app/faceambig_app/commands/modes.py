@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
-from . import kinds
+from . import flexible, kinds
 from .inputs import add_camera, add_fitting, add_input, fit_of, start_of
 from .progress import Progress
 from .shared import (
@@ -50,7 +50,7 @@ def add(command: argparse.ArgumentParser) -> None:
     command.add_argument("--count", type=int, help="modes listed (default 3)")
     command.add_argument(
         "--at",
-        choices=tuple(kinds.AT),
+        choices=tuple(flexible.AT),
         help="where the landmarks' change is taken (default reprojection)",
     )
     command.add_argument(
@@ -102,7 +102,7 @@ def run(options: argparse.Namespace) -> int:
         if options.extremes
         else kinds.posterior
         if options.posterior
-        else kinds.flexible
+        else flexible.flexible
     )
     result = kind(options, fit)
     note = f"{fit.model.name} model; {start.notes['landmarks']}"
