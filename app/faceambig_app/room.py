@@ -22,7 +22,7 @@ from .state import ViewState
 log = logging.getLogger("faceambig")
 
 REST = 0.2  # seconds without a change before the full mesh is drawn
-FAREWELL = 1.0  # seconds for what is being computed when the page is closed
+FAREWELL = 0.5  # seconds for what is being computed when the page is closed; then it is abandoned
 WORKERS = 2  # measured: one was not better than two, and Python holds the interpreter's lock beyond
 
 
