@@ -74,7 +74,7 @@ for-demo:
 	@tools/system_packages.sh "$(PY)" venv gl
 
 for-test:
-	@tools/system_packages.sh "$(PY)" venv gl browser node
+	@tools/system_packages.sh "$(PY)" venv gl browser node nginx
 
 .venv/.app: pyproject.toml requirements.lock
 	@tools/system_packages.sh "$(PY)" venv

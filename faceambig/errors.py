@@ -1,7 +1,8 @@
 """Errors a user can mend, each one line: what is wrong, the value, what is accepted.
 
 ValueError            arguments
-`-- AssetError        files: a model, a landmark scheme, a picture, points
+|-- AssetError        files: a model, a landmark scheme, a picture, points
+`-- NotConverged      points and settings for which a fit that the answer rests on has no end
 
 Command line: the message on stderr, exit status 2. Page: a red notice.
 """
@@ -13,6 +14,10 @@ from collections.abc import Iterable
 
 class AssetError(ValueError):
     """A file that cannot be read or does not hold what it should."""
+
+
+class NotConverged(ValueError):
+    """A fit that an answer would rest on did not converge: the same call fails again."""
 
 
 def listed(values: Iterable[object]) -> str:

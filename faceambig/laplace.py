@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .arrays import Array, IntArray
+from .errors import NotConverged
 from .fitting import Fit
 from .fitting.solve import Problem, evaluate, normal_equations
 from .truncated import box_moments
@@ -54,7 +55,9 @@ def laplace_at(problem: Problem, fits: Sequence[Fit]) -> Laplace:
 def refuse_unconverged(fit: Fit) -> None:
     if not fit.converged:
         where = "the orthographic fit" if fit.distance is None else f"the fit at {fit.distance:g} m"
-        raise ValueError(f"fit: {where} did not converge ({fit.status}); raise max_steps")
+        raise NotConverged(
+            f"fit: {where} did not converge ({fit.status}); raise max_steps, or assume more noise"
+        )
 
 
 def nearest_node(nodes: Array, kappas: Array) -> IntArray:

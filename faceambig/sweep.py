@@ -19,9 +19,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import Array, checked, number, read_only
-from .camera import Camera, depths
+from .camera import Camera
 from .fitting import Fit, FitOptions
 from .fitting.result import Jacobian, Method, Weighting
+from .fitting.solve import cost
 from .fitting.tangent import tangent
 from .fitting.task import FARTHEST, NEAREST, Task, prepare, solve_from, start_of
 from .metrics import HUMAN_TOLERANCE_PERCENT
@@ -182,10 +183,17 @@ def sweep_distance(
             f"distances: {grid[0]:g} to {grid[-1]:g} m is not within {NEAREST:g} to {FARTHEST:g}"
         )
     task = prepare(model, observation, options)
+    return sweep_from(task, cold(task, 0.0), grid, progress)
+
+
+def sweep_from(
+    task: Task, first: Fit, grid: Array, progress: Callable[[int], object] | None = None
+) -> Sweep:
+    """The sweep of a task along distances (D,), ascending, metres, from its orthographic fit."""
     kappas = [0.0, *(1.0 / grid[::-1]).tolist()]
-    path = follow(task, kappas, _cold(task, 0.0), progress)
+    path = follow(task, kappas, first, progress)
     disagreed: list[float] = []
-    if options.least_squares and _differ(task, path[-1], arrival := _cold(task, kappas[-1])):
+    if task.options.least_squares and _differ(task, path[-1], arrival := cold(task, kappas[-1])):
         back = follow(task, kappas[::-1], arrival)[::-1]
         pairs = list(zip(path, back, strict=True))
         disagreed = [a.distance or np.inf for a, b in pairs if _differ(task, a, b)]
@@ -202,10 +210,25 @@ def follow(
     """Fits at `kappas`, per metre, each from those before it; `first` is the one at kappas[0]."""
     path = [first]
     for kappa in kappas[1:]:
-        path.append(solve_from(task, *_start(task, path[-3:], kappa)))
+        path.append(_next(task, path[-3:], kappa))
         if progress is not None:
             progress(1)
     return path
+
+
+def _next(task: Task, last: Sequence[Fit], kappa: float) -> Fit:
+    """The fit at kappa after `last`; where it does not converge, the best of other starts that does.
+
+    Where the shape is hardly held, a path ends at a fold, and what lies beyond is far away.
+    """
+    fit = solve_from(task, *_start(task, last, kappa))
+    if fit.converged or not task.options.least_squares:
+        return fit
+    starts = (replace(last[-1].camera, kappa=kappa), last[-1].alpha), start_of(task, kappa)
+    others = [solve_from(task, *start) for start in starts if cost(task.problem, *start) < np.inf]
+    return min(
+        (other for other in others if other.converged), key=lambda other: other.cost, default=fit
+    )
 
 
 def path_speeds(fits: Sequence[Fit]) -> Array:
@@ -241,8 +264,8 @@ def _unrigid(shape: Array, velocity: Array) -> Array:
     return velocity - centred @ np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
 
 
-def _cold(task: Task, kappa: float) -> Fit:
-    """The fit from the closed-form pose, which knows no other."""
+def cold(task: Task, kappa: float) -> Fit:
+    """The fit at kappa, per metre, from the closed-form pose, which knows no other."""
     return solve_from(task, *start_of(task, kappa))
 
 
@@ -255,17 +278,18 @@ def _start(task: Task, last: Sequence[Fit], kappa: float) -> tuple[Camera, Array
     """Where a fit at kappa starts: the polynomial through the last fits, one to three, or the last one, or afresh.
 
     A polynomial carried far beyond its points ends anywhere: a step much wider than the last starts from its neighbour.
-    The tangent of the path would save no more steps, and costs two.
+    Nor one through fits between which the path has leapt: then the neighbour itself costs less. The tangent of the
+    path would save no more steps, and costs two.
     """
     still = last[-1]
     step, gap = kappa - still.camera.kappa, still.camera.kappa - last[-2:][0].camera.kappa
-    carried = 0 < step / gap <= WIDEST if gap else False
-    camera, alpha = (
-        _carried_on(last, kappa) if carried else (replace(still.camera, kappa=kappa), still.alpha)
-    )
-    if (depths(camera, task.problem.mean + task.problem.modes @ alpha) <= 0).any():
+    starts = [(replace(still.camera, kappa=kappa), still.alpha)]
+    if gap and 0 < step / gap <= WIDEST:
+        starts.insert(0, _carried_on(last, kappa))
+    costs = [cost(task.problem, *start) for start in starts]
+    if min(costs) == np.inf:  # behind the camera
         return start_of(task, kappa)
-    return camera, alpha
+    return starts[int(np.argmin(costs))]
 
 
 def _carried_on(last: Sequence[Fit], kappa: float) -> tuple[Camera, Array]:

@@ -15,7 +15,8 @@ from scipy.integrate import quad
 from scipy.stats import binom, norm, truncnorm
 
 import faceambig as fa
-from faceambig.fitting.solve import Problem, evaluate, normal_equations
+from faceambig.errors import NotConverged
+from faceambig.fitting.solve import Problem, Solution, evaluate, kkt_error, normal_equations
 from faceambig.fitting.task import prepare
 from faceambig.truncated import box_draws, box_moments, cut_moments
 from reference import log_posterior
@@ -446,3 +447,47 @@ def test_what_is_no_model_no_observation_and_no_fit_is_refused(post):
         post.sample(1, seed=-1)
     with pytest.raises(ValueError, match="shares: they are not within 0 to 1"):
         post.distance_density.quantiles([1.5])
+
+
+# --- far less noise assumed than the points have ----------------------------------------------------
+
+
+# (person, distance, yaw, pitch, roll, noise, seed, scheme, noise assumed): each had a fit that did not converge
+HARD = (
+    (2, 0.481, 25.4, -2.7, -16.0, 2.37, 0, "ibug68", 0.137),  # a path that ends at a fold
+    (7, 0.6690568, -21.99142, 11.48022, -28.92853, 1.98128, 3, "ibug68", 0.094238),
+    (4, 0.2231638, -8.4643, 11.11222, -30.9288, 1.92829, 0, "ibug68", 0.053291),
+    (9, 0.2017764, -16.0988, -26.49465, 12.60095, 0.232666, 3, "farkas", 0.064357),
+    # After a leap of the path the polynomial through its fits ended anywhere
+    (7, 0.2790895, 56.16681, -5.28903, -2.21344, 3.92231, 5, "farkas", 0.037233),
+)
+# Here no fit is best: E falls for ever while the face is drawn together, and s grows. It ended in an OverflowError
+NONE_BEST = (8, 0.5604562, 23.23388, 2.31567, 34.89595, 3.66683, 8, "ibug68", 0.104277)
+
+
+def posterior_of(person: int, actual: float, *rest: Any) -> fa.Posterior:
+    yaw, pitch, roll, noise, seed, scheme, assumed = rest
+    model = fa.load_model("embedded")
+    observation = fa.observe(
+        model.subject(person), distance=actual, yaw_deg=yaw, pitch_deg=pitch, roll_deg=roll,
+        noise_percent=noise, seed=seed, scheme=scheme,
+    )  # fmt: skip
+    return fa.posterior(model, observation, noise_percent=assumed)
+
+
+@pytest.mark.parametrize("settings", HARD)
+def test_faces_far_from_the_mean_are_followed_to_their_ends(settings):
+    post = posterior_of(*settings)
+    problem = problem_of(post)
+    for fit in (post.sweep.orthographic, *post.sweep.fits):
+        solution = Solution(fit.alpha, fit.camera, fit.cost, fit.steps, fit.status)
+        # The solver stops where a step promises 1e-8 of E: scaled by sqrt(E H_jj) the gradient is at most 1e-4
+        assert kkt_error(problem, solution) < 1e-4
+    assert np.isfinite(post.distance_density.density).all()
+
+
+def test_where_no_fit_is_best_it_is_said_in_words():
+    with pytest.raises(
+        NotConverged, match=r"the orthographic fit did not converge.*assume more noise"
+    ):
+        posterior_of(*NONE_BEST)

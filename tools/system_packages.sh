@@ -2,8 +2,9 @@
 # Finds what pip cannot bring and gets it where that is allowed: as root on Debian and Ubuntu by apt-get.
 # Elsewhere it says in one line what to type; it never calls sudo.
 #
-#   tools/system_packages.sh PYTHON [venv] [gl] [browser] [node]
+#   tools/system_packages.sh PYTHON [venv] [gl] [browser] [node] [nginx]
 #
+# nginx is unpacked into build/nginx for its test and not installed: a package of Debian starts a server at port 80.
 # Exit 1 if PYTHON cannot serve. A missing renderer or browser stops nothing here: the tests that need
 # one skip with a reason, or fail where CI=true.
 set -eu
@@ -11,6 +12,7 @@ set -eu
 python=$1
 shift
 wanted=$*
+unpacked=build/nginx
 renderer="libegl1 libgl1 libgl1-mesa-dri libosmesa6"
 
 stop() {
@@ -30,8 +32,24 @@ has() {
         [ -n "${FACEAMBIG_CHROMIUM:-}" ] || command -v chromium || command -v chromium-browser ||
             command -v google-chrome || ls -d "$HOME"/.cache/ms-playwright/chromium-*
         ;;
+    nginx) PATH="$PATH:/usr/sbin:/usr/local/sbin:$unpacked/usr/sbin" command -v nginx ;;
     node) loads libatomic.so.1 ;; # playwright brings its own Node, which needs this one library
     esac >/dev/null 2>&1
+}
+
+# Needs no root. The program is in another package on each system; a missing one only skips a test.
+fetch_nginx() {
+    command -v apt-get >/dev/null && command -v dpkg-deb >/dev/null || return 0
+    mkdir -p "$unpacked"
+    # A container has no lists of packages
+    [ "$(id -u)" != 0 ] || apt-get -qq -o DPkg::Lock::Timeout=120 update >/dev/null 2>&1 || true
+    for package in nginx nginx-core; do
+        (
+            cd "$unpacked" && apt-get -qq download "$package" && dpkg-deb -x "$package"_*.deb .
+        ) </dev/null >/dev/null 2>&1 || true
+        [ ! -x "$unpacked/usr/sbin/nginx" ] || break
+    done
+    "$unpacked/usr/sbin/nginx" -v >/dev/null 2>&1 || rm -rf "$unpacked"
 }
 
 # What is missing, in $names; its packages, in $packages; a browser that apt cannot give, in $by_playwright.
@@ -54,6 +72,7 @@ find_missing() {
                 packages="$packages chromium"
             fi
             ;;
+        nginx) fetch_nginx ;;
         node)
             names="$names, libatomic (page tests)"
             packages="$packages libatomic1"

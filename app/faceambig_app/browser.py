@@ -81,7 +81,8 @@ class Browser:
         self._dark = False  # whether this person's system is dark
         self._greeted = False  # whether the page's script has told its address
         self._owned = False  # whether there is a photograph of this person
-        self.language = self._asked = language()  # spoken; what the browser asks for
+        # Spoken; what the browser asks for: by its request, until the page's script tells
+        self.language = self._asked = accepted(guard.languages())
         self.stage = Stage(client, self._orbited)
         self._dress()
         self.script = Script(client.gui, self.report)
@@ -109,7 +110,7 @@ class Browser:
         )  # fmt: skip
         self._invitation = invitation
         self._first: TimerHandle | None = None  # opens the page where no script says a word
-        self._built = False  # the panel waits for the language that the page's script asks for
+        self._built = False  # whether there is a panel
 
     def _build(self) -> None:
         """The panel and the commands, in the language that is spoken."""
@@ -139,15 +140,17 @@ class Browser:
     # ---------------------------------------------------------------- what a person does, on the loop
 
     def open(self) -> None:
-        """Draw the first frame: of the state in the address, or of the default where no script tells."""
-        self._first = self._loop.call_later(HELLO, self._unheard)
+        """Make the panel. The first frame is of the state in the address, or of the default where no script tells."""
+        with speaking(self._language_of(self.room.state)):
+            with self._client.atomic():  # else each control wakes the loop, which is here
+                self._translate()
+            self._client.flush()
+            self._first = self._loop.call_later(HELLO, self._unheard)
 
     def _unheard(self) -> None:
         """Begin, with or without a word of the page's script."""
         if self.room.left:
             return
-        if not self._built:
-            self._translate()
         if self._seat is not None and not self._greeted:
             self._begin(self.room.state)
         self.room.open()

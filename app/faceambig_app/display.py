@@ -34,6 +34,14 @@ class Rest(NamedTuple):
     numbers: Numbers
 
 
+class Sent(NamedTuple):
+    """Of what the elements are that seldom change; noted once they are sent, for a frame may fail before."""
+
+    curves: object = None  # target and fitting of the plots
+    crosses: object = None  # (target, whether they are shown); None: none of a target's
+    picture: object = None  # what the photograph shows: (target, draft), or a person's own
+
+
 class Display:
     """The elements and nodes of one browser. `gone` says whether the browser has left meanwhile."""
 
@@ -41,12 +49,8 @@ class Display:
         self, client: viser.ClientHandle, stage: Stage, panel: Panel, *, gone: Callable[[], bool]
     ) -> None:
         self._client, self._stage, self._panel, self._gone = client, stage, panel, gone
-        self._curves_of: object = None  # what the plots show
         self._rested: ViewState | None = None  # the state drawn in full last
-        self._crosses_of: object = (
-            None  # (target, whether they are shown); None: none of a target's
-        )
-        self._picture_of: object = None  # what the photograph shows: (target, draft)
+        self._sent = Sent()
 
     def draw(self, state: ViewState, draft: bool, own: OwnPhoto | None) -> Rest | None:
         """Compute a state and send it; a draft is for while a hand moves, and says nothing.
@@ -56,19 +60,22 @@ class Display:
         if state.subject == "photo":
             return self._draw_own(own, state, draft)
         shown = drawn(state, draft, self._rested)
-        self._send(self._contents(state, shown, draft), shown.scene, draft)
+        html, sent = self._contents(state, shown, draft)
+        self._send(html, shown.scene, draft)
+        self._sent = sent
         if draft:
             return None
         self._rested = state
         # Heads first: a new target's curves cost a sweep and a posterior
-        plot = shown.curves
-        self._curves_of = curve_key(state.target, state.fitting)
-        self._send([(self._panel.places.plots, plot), *self._others(shown)])
+        self._send([(self._panel.places.plots, shown.curves), *self._others(shown)])
+        self._sent = sent._replace(curves=curve_key(state.target, state.fitting))
         return Rest(shown.sliders, None, shown.scene.numbers)
 
     def _draw_own(self, own: OwnPhoto | None, state: ViewState, draft: bool) -> Rest | None:
         shown = own_frame(own, state, draft)
-        self._send(self._own_contents(own, state, shown, draft), whole(shown.scene), draft)
+        html, sent = self._own_contents(own, state, shown, draft)
+        self._send(html, whole(shown.scene), draft)
+        self._sent = sent
         if draft:
             return None
         return Rest(shown.sliders, told_distance(own, state), shown.scene.numbers)
@@ -94,50 +101,47 @@ class Display:
                 handle.content = content
         self._client.flush()
 
-    def _contents(self, state: ViewState, shown: Drawn, draft: bool) -> Contents:
+    def _contents(self, state: ViewState, shown: Drawn, draft: bool) -> tuple[Contents, Sent]:
         """What the elements of the panel show of a frame."""
-        at = self._panel.places
+        at, sent = self._panel.places, self._sent
         html: Contents = []
         crosses = (state.target, shown.scene.photo.points_shown)
-        if crosses != self._crosses_of:  # 0.3 ms that a hand on the distance does not need
+        if crosses != sent.crosses:  # 0.3 ms that a hand on the distance does not need
             html.append((at.crosses, shown.crosses))
-            self._crosses_of = crosses
+            sent = sent._replace(crosses=crosses)
         if self._stage.narrow:
             html.append((at.marks, shown.side_by_side))
         else:
             html += [(at.cards, shown.cards), (at.marks, shown.marks)]
         if (
-            curve_key(state.target, state.fitting) == self._curves_of
+            curve_key(state.target, state.fitting) == sent.curves
         ):  # else at rest, when all else is shown
             html.append((at.plots, shown.curves))
-        if (state.target, draft) != self._picture_of and not (
-            draft and self._picture_of == (state.target, False)
-        ):
-            html.append((at.picture, photograph.photo_picture(photo_jpeg(state.target, draft))))
-            self._picture_of = (state.target, draft)
+        picture = (state.target, draft)
+        if sent.picture not in (picture, (state.target, False)):
+            html.append((at.picture, photograph.photo_picture(photo_jpeg(*picture))))
+            sent = sent._replace(picture=picture)
         if not draft:
             html += self._at_rest(state, shown)
-        return html
+        return html, sent
 
     def _own_contents(
         self, own: OwnPhoto | None, state: ViewState, shown: OwnFrame, draft: bool
-    ) -> Contents:
+    ) -> tuple[Contents, Sent]:
         """As `_contents`, of a person's own photograph."""
-        at, scene = self._panel.places, shown.scene
+        at, scene, sent = self._panel.places, shown.scene, self._sent
         cards, marks = own_page.cards(own, state, scene), own_page.marks(own, scene)
         html: Contents = [(at.crosses, "")]
-        self._crosses_of = None
         if self._stage.narrow:  # one below the other: a finger needs a large photograph
             html.append((at.marks, marks + cards))
         else:
             html += [(at.cards, cards), (at.marks, marks)]
         taken = None if own is None else own.taken
-        if self._picture_of is not taken or taken is None:
+        if sent.picture is not taken or taken is None:
             picture = "" if taken is None else photograph.photo_picture(taken.jpeg)
             html.append((at.picture, picture))
-            self._picture_of = taken
         if not draft:
-            self._curves_of = None
+            sent = sent._replace(curves=None)
             words = own_page.spoken(own, state, scene) + figures.heads_words(scene)
             html += [
                 (at.plots, own_page.curves(own, state, scene)),
@@ -147,7 +151,7 @@ class Display:
                 *((place, "") for place in (at.flex, at.spectrum, at.pins)),
                 (at.heading, own_page.heading(own, state)),
             ]
-        return html
+        return html, sent._replace(crosses=None, picture=taken)
 
     def _at_rest(self, state: ViewState, shown: Drawn) -> Contents:
         at = self._panel.places

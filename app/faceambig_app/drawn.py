@@ -70,9 +70,9 @@ class Drawn:
     @_once
     def curves(self) -> str:
         """The plots; of a new target a sweep and a posterior."""
-        return plots.plots(
-            plots_of(self.state), self.scene.numbers, hide=self.state.hide, brief=self._draft
-        )
+        shown = plots_of(self.state)
+        drawn = plots.plots(shown, self.scene.numbers, hide=self.state.hide, brief=self._draft)
+        return drawn if shown.density is not None else drawn + plots.nothing_likely()
 
     @_once
     def legend(self) -> str:

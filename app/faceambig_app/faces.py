@@ -11,6 +11,7 @@ import numpy as np
 
 import faceambig as fa
 from faceambig.compose import Face, curves, measure, with_density
+from faceambig.errors import NotConverged
 from faceambig.scene import Curves
 
 from .fits import fitted, options, photograph
@@ -69,7 +70,7 @@ def curve(target: Target, fitting: Fitting) -> Curves:
 
 
 def likely_curve(target: Target, fitting: Fitting) -> Curves:
-    """The curves with how likely each distance is."""
+    """The curves with how likely each distance is; without, where the points contradict the noise assumed."""
     return _likely_curve(*curve_key(target, fitting), source(target, fitting))
 
 
@@ -95,4 +96,8 @@ def _sweep(target: Target, fitting: Fitting) -> fa.Sweep:
 
 @lru_cache(maxsize=64)
 def _likely_curve(target: Target, fitting: Fitting, of: Source) -> Curves:
-    return with_density(_curve(target, fitting), posterior(of).distance_density)
+    plain = _curve(target, fitting)
+    try:
+        return with_density(plain, posterior(of).distance_density)
+    except NotConverged:  # the other curves are there all the same, and it would fail again
+        return plain

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Protocol
 
+FAREWELL = 0.3  # seconds for what is being made when the page is closed; then it is abandoned
+
 Progress = Callable[[int, int], None]  # how much is done, of how much
 Work = Callable[[Progress], tuple[str, bytes]]  # makes (name, contents)
 
@@ -78,13 +80,13 @@ class Orders:
             return bool(mine)
 
     def close(self) -> None:
-        """Take all orders back and end the thread, at the latest when its work next tells how far it is."""
+        """Take all orders back; the thread ends at the latest when its work next tells how far it is."""
         with self._changed:
             self._closed = True
             for order in self._line:
                 order.stopped = True
             self._changed.notify()
-        self._thread.join(timeout=0.5)
+        self._thread.join(timeout=FAREWELL)
 
     def _run(self) -> None:
         while (order := self._next()) is not None:

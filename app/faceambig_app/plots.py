@@ -150,6 +150,11 @@ def interval_words(curves: Curves) -> str:
     )
 
 
+def nothing_likely() -> str:
+    """Why there is no plot of how likely each distance is."""
+    return f'<div class="fa"><p><small>{escape(say("plot.likely_none"))}</small></p></div>'
+
+
 def likely_words(curves: Curves) -> str:
     """The intervals of the posterior and what lies beyond the axis, as sentences."""
     words = [say("plot.likely_lead")]

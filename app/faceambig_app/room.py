@@ -26,10 +26,8 @@ log = logging.getLogger("faceambig")
 REST = 0.2  # seconds without a change before the full mesh is drawn
 BREATH = 0.05  # seconds after a draft that came late: newer values may wait to be heard
 YIELD = 0.3  # seconds for which a full frame lets drafts pass, and no longer
-FAREWELL = 1.0  # seconds for what is being computed when the page is closed
-WORKERS = (
-    3  # Python runs one at a time, and a processor more in NumPy; one is kept for hands that move
-)
+FAREWELL = 0.5  # seconds for what is being computed when the page is closed; then it is abandoned
+WORKERS = 3  # Python runs one at a time, and NumPy two; one is kept for hands that move
 
 
 class Painter(Protocol):
@@ -53,10 +51,14 @@ class Room:
         self._painter, self._ring = painter, ring
         self._changed_at = 0.0  # monotonic seconds
         self._drawn: tuple[float, bool] | None = None  # the change drawn last; whether as a draft
+        self._refused_at: float | None = None  # the change that was refused since a frame was drawn
 
     def go(self, state: ViewState) -> None:
-        """Make `state` the newest and ask to be served. On the event loop only: one writer, in message order."""
-        if state == self.state:
+        """Make `state` the newest and ask to be served. On the event loop only: one writer, in message order.
+
+        The same state once more asks for nothing, but where it could not be drawn: what it failed by may have passed.
+        """
+        if state == self.state and self._refused_at != self._changed_at:
             return
         self.state = state
         self._changed_at = time.monotonic()
@@ -82,13 +84,20 @@ class Room:
         if self._drawn not in ((at, draft), (at, False)):
             try:
                 self._painter.draw(state, draft)
-                self._drawn = (at, draft)
+                self._refused_at = None
             except Exception as error:  # noqa: BLE001 - a fit may fail in any way; worker and last frame must survive
-                self._drawn = (at, False)  # it would fail again
-                if not self.left:
-                    self._painter.refuse(error)
+                self._refuse(at, draft, error)
+            self._drawn = (at, draft)  # a draft that failed may be drawn in full all the same
         if self._drawn == (at, True):
             self._ring(self, max(wait, BREATH))
+
+    def _refuse(self, at: float, draft: bool, error: BaseException) -> None:
+        """Say why, once of a change, and of a hand that goes on moving once until it rests."""
+        told = self._refused_at is not None if draft else self._refused_at == at
+        if not told:
+            self._refused_at = at
+            if not self.left:
+                self._painter.refuse(error)
 
 
 class Turn(NamedTuple):

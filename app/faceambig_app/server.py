@@ -11,6 +11,7 @@ import math
 import re
 import signal
 import sys
+import threading
 import time
 import warnings
 from collections.abc import Collection
@@ -35,6 +36,7 @@ from .stage import FAR, FIRST_FOV, FIRST_POSITION, NEAR
 from .state import DEFAULT
 from .text import AUTO, say
 
+STOPPING = 0.5  # seconds for the farewells to the browsers
 CLOSED = re.compile("Queued a .* on a closed connection")  # a warning of viser
 
 
@@ -137,10 +139,12 @@ class Page:
         return f"{places[0]}?lead={self._lead}"
 
     def close(self) -> None:
-        """Stop serving; returns within two seconds."""
+        """Stop serving: within 1.5 s, whatever is being computed and whoever does not answer a farewell."""
         self._orders.close()
         self._dispatcher.close()
-        self._server.stop()
+        stopping = threading.Thread(target=self._server.stop, name="faceambig-stop", daemon=True)
+        stopping.start()  # viser would wait for six seconds
+        stopping.join(timeout=STOPPING)
 
 
 def refusal(control: Any, asked: object, put: object) -> str:
@@ -180,12 +184,18 @@ def serve(
     limits: guard.Limits | None = None,
     present: bool = False,
 ) -> int:
-    """Serve the page until SIGINT or SIGTERM; the exit status. present: for a class, which one browser leads."""
+    """Serve the page until SIGINT or SIGTERM; the exit status. present: for a class, which one browser leads.
+
+    What is still being computed then goes on in threads that Python waits for when it ends: leave by `os._exit`.
+    """
     status: int | None = None
+    page: Page | None = None
 
     def stop(number: int, _: FrameType | None) -> None:
         nonlocal status
         status = 130 if number == signal.SIGINT else 0
+        if page is None:  # a model is being read: that would take longer than anybody waits
+            raise SystemExit(status)
 
     # viser says it of every browser that leaves while something is drawn for it, with lines of its own source
     warnings.filterwarnings("ignore", CLOSED.pattern, UserWarning)

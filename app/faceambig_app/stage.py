@@ -103,6 +103,7 @@ class Stage:
                 where = None if through else (head.vertices, scene.pivot)
                 same = where is not None and _is(self._where.get(head.name), where)
                 if not (same and nodes.keep(head, draft)):
+                    self._where.pop(head.name, None)  # if this fails, they are nowhere known
                     nodes.show(_points(scene, head), head, draft)
                     self._where[head.name] = where
             nodes.write(None if through else _board(scene, head, self._viewer.sight))

@@ -37,6 +37,9 @@ SHORT_STEP = 0.3  # below this the quadratic model is bad: damp the next step
 FIRST_DAMPING, MORE_DAMPING = 1e-5, 3.0
 POOR = 0.5  # share of the predicted decrease below which a shorter step is tried too
 LARGEST_TURN = 1.0  # radians a step; beyond, the linearised rotation says nothing
+LARGEST_GROWTH = (
+    2.0  # of log s a step, seven times as large; no overflow where the shape is hardly held
+)
 QP_ROUNDS_EARLY, QP_ROUNDS = (2, 3, 4), 200  # far from the optimum the active set need not be exact
 EPS = float(np.finfo(float).eps)
 LEAST_PRIOR = 1e-10  # px^2
@@ -228,8 +231,8 @@ def _line_search(
     of the last.
     """
     S, E = len(point.alpha), point.cost
-    turn = math.hypot(*delta[S : S + 3].tolist())
-    length = min(1.0, LARGEST_TURN / turn) if turn > 0 else 1.0
+    turn, growth = math.hypot(*delta[S : S + 3].tolist()), abs(float(delta[S + 5]))
+    length = 1.0 / max(1.0, turn / LARGEST_TURN, growth / LARGEST_GROWTH)
     for _ in range(30):
         new = yield Trial(point, delta, length)
         if new.cost <= E - 1e-4 * length * slope:

@@ -23,7 +23,12 @@ from guarded import PART, SOON, Browser, Tiny, begin, piece, tiny_page, until
 
 TOKEN = "a-token-of-the-class-1"
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "security.md"
-NGINX = shutil.which("nginx", path=f"{os.environ.get('PATH', '')}:/usr/sbin:/usr/local/sbin")
+UNPACKED = (
+    Path(__file__).resolve().parents[2] / "build" / "nginx" / "usr" / "sbin"
+)  # tools/system_packages.sh
+NGINX = shutil.which(
+    "nginx", path=f"{os.environ.get('PATH', '')}:/usr/sbin:/usr/local/sbin:{UNPACKED}"
+)
 
 
 @pytest.fixture(scope="module")

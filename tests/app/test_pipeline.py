@@ -20,6 +20,7 @@ from faceambig.metrics import surface_difference
 from faceambig.rotation import rotation_matrix
 from faceambig.scene import Curves
 from faceambig_app import faces, files, fits, likely, pipeline, scenes
+from faceambig_app.drawn import Drawn
 from faceambig_app.fields import VIEWS
 from faceambig_app.likely import Source
 from faceambig_app.pipeline import draft, frame, plots_of
@@ -578,3 +579,17 @@ def test_what_a_slider_says_is_its_mode():
         moved = mm * ours.landmark_percent[mode.number - 1] if mode.number <= 6 else 0.0
         assert moved <= 1 + 1e-9
         assert mm <= mode.high
+
+
+def test_curves_without_a_posterior_say_so():
+    """The points contradict the noise assumed so much that no fit is best; the other curves are there all the same."""
+    weak = changed(
+        DEFAULT, subject=8, actual=0.5604562, yaw=23.23388, pitch=2.31567, roll=34.89595,
+        noise=3.66683, seed=8, prior=0.104277,
+    )  # fmt: skip
+    for state, there in ((weak, False), (DEFAULT, True)):
+        assert (plots_of(state).density is not None) == there
+        told = Drawn(state, frame(state), False).curves
+        assert (say("plot.likely_none") in told) != there
+        assert (say("plot.likely_lead") in told) == there
+        assert "<svg" in told

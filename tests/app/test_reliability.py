@@ -24,10 +24,11 @@ import pytest
 import viser
 
 from faceambig_app import browser as browser_module
-from faceambig_app import drawn, pipeline, server
+from faceambig_app import drawn, photograph, pipeline, server
 from faceambig_app.link import query
 from faceambig_app.panel import Panel
 from faceambig_app.room import Room
+from faceambig_app.scenes import photo_jpeg
 from faceambig_app.stage import Stage
 from faceambig_app.state import DEFAULT, changed
 
@@ -191,6 +192,27 @@ def test_numbers_that_are_none_are_refused_before_they_are_sent(monkeypatch, com
     is_served(wire, 50)
     assert seen
     assert all(seen)
+
+
+def test_what_a_failed_frame_did_not_send_is_sent_by_the_next(monkeypatch, come):
+    """The photograph, its crosses and the plots are sent when they change: a frame that fails has not sent them."""
+    wire, real, fails = come(), Stage.show, threading.Event()
+    fails.set()
+
+    def show(self: Stage, scene: Any, draft: bool) -> None:
+        if fails.is_set() and not draft:
+            raise MemoryError
+        real(self, scene, draft)
+
+    monkeypatch.setattr(Stage, "show", show)
+    wire.set(wire.control("Dropdown", "Person"), "Person 5")
+    assert wire.wait(lambda: wire.notices, SOON)
+    picture = photograph.photo_picture(photo_jpeg(changed(DEFAULT, subject=5).target, False))
+    assert picture not in wire.shown
+    fails.clear()
+    drag(wire, 40)
+    assert wire.wait(lambda: "distance" in wire.query, SOON)
+    assert picture in wire.shown
 
 
 def test_a_browser_that_cannot_be_made_costs_the_others_nothing(monkeypatch, page, come, wires):

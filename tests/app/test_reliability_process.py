@@ -20,10 +20,15 @@ import pytest
 SOON = 60.0  # seconds: other tests share the processors
 FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 MAIN = "import sys; from faceambig_app.cli import main; sys.exit(main())"
-# All that is computed for a browser takes a minute
+# All that is computed for a browser takes a minute, and a photograph is being read for as long
 SLOW = """
-import time
-from faceambig_app import display
+import asyncio, time
+from faceambig_app import display, server
+enter = server.Page._enter
+async def reading(page, client):
+    await enter(page, client)
+    page.reading = asyncio.create_task(asyncio.to_thread(time.sleep, 60))
+server.Page._enter = reading
 def slow(real):
     def call(*a, **o):
         print("busy", flush=True)
@@ -32,6 +37,11 @@ def slow(real):
     return call
 display.drawn = slow(display.drawn)
 """
+HANDSHAKE = (
+    "GET / HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nOrigin: http://127.0.0.1:{port}\r\nUpgrade: websocket\r\n"
+    "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+    "Sec-WebSocket-Protocol: viser-v1.1.1\r\n\r\n"
+)
 
 
 @pytest.fixture(scope="module")
@@ -124,19 +134,45 @@ def test_a_killed_server_is_started_again_under_open_pages_and_ends_under_load(w
     assert is_free(port)
 
 
-def test_it_ends_while_both_workers_compute_for_a_minute(wires):
-    with served(before=SLOW) as (process, port):
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 0)])
+def test_it_ends_while_both_workers_compute_for_a_minute(wires, number, status):
+    with (
+        served(before=SLOW) as (process, port),
+        socket.create_connection(("127.0.0.1", port)) as mute,
+    ):
+        mute.sendall(HANDSHAKE.format(port=port).encode())  # and never answers a farewell
         pages = [wires.Wire(port) for _ in range(2)]
         assert process.stdout is not None
         assert [process.stdout.readline() for _ in pages] == ["busy\n"] * 2
         start = time.monotonic()
-        process.send_signal(signal.SIGINT)
+        process.send_signal(number)
         err = ended(process, wires, lambda: [page.read(0.01) for page in pages])
-        assert process.returncode == 130
+        assert process.returncode == status
         assert err == ""
         # two seconds are promised; the machine may be busy, but what they compute is not waited for
         assert time.monotonic() - start < 30
     assert is_free(port)
+
+
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 0)])
+def test_it_ends_while_its_first_face_is_computed(number, status):
+    slow = """
+from faceambig_app import server
+def slow(state):
+    print("busy", flush=True)
+    time.sleep(60)
+import time
+server.frame = slow
+"""
+    with subprocess.Popen(
+        [sys.executable, "-c", f"{slow}\n{MAIN}", "serve", "--port", "0"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    ) as process:  # fmt: skip
+        assert process.stdout is not None
+        assert process.stdout.readline() == "busy\n"
+        process.send_signal(number)
+        _, err = process.communicate(timeout=30)
+    assert (process.returncode, err) == (status, "")
 
 
 # ---------------------------------------------------------------- files

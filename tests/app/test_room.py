@@ -364,6 +364,46 @@ def test_an_error_is_refused_in_words_and_the_worker_goes_on(dispatchers, quick)
     assert canvas.threads == {"faceambig-worker-0"}
 
 
+def test_a_draft_that_fails_once_is_drawn_in_full_when_the_hand_rests(dispatchers, quick):
+    canvas, failures = Canvas(), iter([True])
+    canvas.fails = lambda _: next(failures, False)
+    room = Room(DEFAULT, canvas, dispatchers().ring)
+    room.go(at(0.3))
+    until(lambda: (at(0.3), False) in canvas.drawn)
+    assert len(canvas.refused) == 1
+
+
+def test_a_state_that_could_not_be_drawn_is_tried_when_it_is_asked_for_again(quick):
+    canvas, failures, rings = Canvas(), iter([True]), []
+    canvas.fails = lambda _: next(failures, False)
+    room = Room(at(0.3), canvas, lambda _, after: rings.append(after))
+    room.serve()
+    assert len(canvas.refused) == 1
+    room.serve()  # by itself it is not
+    assert canvas.drawn == []
+    room.go(at(0.3))
+    assert rings == [0.0]
+    time.sleep(quick)
+    room.serve()
+    room.serve()
+    assert canvas.drawn == [(at(0.3), True), (at(0.3), False)]
+    room.go(at(0.3))
+    assert rings == [0.0, module.BREATH]  # now it is there
+
+
+def test_a_hand_that_moves_on_over_failures_is_told_once_and_again_where_it_rests(quick):
+    canvas = Canvas()
+    canvas.fails = lambda _: True
+    room = Room(DEFAULT, canvas, lambda _, after: None)
+    for distance in (0.3, 0.4, 0.45):
+        room.go(at(distance))
+        room.serve()
+    assert len(canvas.refused) == 1
+    time.sleep(quick)
+    room.serve()
+    assert len(canvas.refused) == 2
+
+
 def test_the_last_good_state_is_drawn_again_after_one_that_failed(dispatchers, quick):
     canvas = Canvas()
     canvas.fails = lambda state: state.distance < 0.5

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import logging
+import os
+import sys
 
 
 def add(command: argparse.ArgumentParser) -> None:
@@ -46,13 +49,18 @@ def add(command: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Serve the page until interrupted."""
+    """Serve the page until interrupted, and end the program."""
     from .. import guard
     from ..server import serve
 
     token = guard.make_token() if options.token == "" else options.token
     limits = guard.Limits(sessions=options.max_sessions, idle=60 * options.idle_minutes)
-    return serve(
+    status = serve(
         options.host, options.port, token=token, allowed=options.allow_host, limits=limits,
         present=options.present,
     )  # fmt: skip
+    logging.shutdown()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    # Python itself would wait for a photograph that is being read, and take a second to put all of a model away
+    os._exit(status)

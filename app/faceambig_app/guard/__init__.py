@@ -23,14 +23,14 @@ from .page import PATCHES, make_page, our_script
 from .panels import clear
 from .reports import MAX_REPORT, add_reports
 from .requests import listen
-from .sessions import Limits, leads
+from .sessions import Limits, languages, leads
 from .uploads import MAX_UPLOAD, add_upload
 from .values import TYPING, restate
 
 __all__ = [
     "MAX_BAD", "MAX_MESSAGE", "MAX_REPORT", "MAX_UPLOAD", "PATCHES", "TYPING", "Hooks", "Limits", "ServeError",
-    "add_colours", "add_reports", "add_upload", "clear", "data_html", "leads", "links", "log_line", "make_token",
-    "needs_token", "qr_code", "qr_svg", "restate", "send_file", "start",
+    "add_colours", "add_reports", "add_upload", "clear", "data_html", "languages", "leads", "links", "log_line",
+    "make_token", "needs_token", "qr_code", "qr_svg", "restate", "send_file", "start",
 ]  # fmt: skip
 
 

@@ -11,7 +11,8 @@ import threading
 import types
 import warnings
 from collections.abc import Awaitable, Callable, Sequence
-from typing import Any
+from functools import lru_cache
+from typing import Any, get_type_hints
 
 import viser
 import websockets.asyncio.server
@@ -29,7 +30,7 @@ from viser.infra._async_message_buffer import AsyncMessageBuffer
 from .door import DOOR, Door, log_line
 from .messages import MAX_MESSAGE, consume, dispatch
 from .pinned import ServeError, check_viser
-from .requests import answer, dress
+from .requests import answer, dress, preferred
 from .sessions import SESSION, Session, produce
 from .uploads import part, start
 from .values import update
@@ -83,6 +84,7 @@ def install() -> None:
         (_gui_api.GuiApi, "_handle_file_transfer_start", start),
         (_gui_api.GuiApi, "_handle_file_transfer_part", part),
         (_assignable_props_api.AssignablePropsBase, "_cast_value_recursive", _cast),
+        (_assignable_props_api.AssignablePropsBase, "_prop_hints", property(_hints)),
         (_viser, "ViserTunnel", _NoTunnel),
         (_client_autobuild, "ensure_client_is_built", lambda: None),  # it would call npm
     ]
@@ -150,7 +152,12 @@ def _serve(handler: Callable[[Any], Awaitable[None]], host: str, port: int, **op
         if door.full(cookies):  # several came in at once
             await connection.close(1013, "too many browsers")
             return
-        session = Session(door.limits, connection, leads=door.access.leads(cookies))
+        session = Session(
+            door.limits,
+            connection,
+            leads=door.access.leads(cookies),
+            languages=preferred(connection.request.headers.get_all("Accept-Language")),
+        )
         DOOR.set(door)
         SESSION.set(session)
         door.sessions.add(session)
@@ -195,6 +202,14 @@ def _cast(self: Any, hint: Any, value: Any, prop_name: str) -> Any:
     if value is None or isinstance(value, str | bool | int | float):
         return value
     return _real_cast(self, hint, value, prop_name)
+
+
+def _hints(self: Any) -> dict[str, Any]:
+    """viser's, which reads the types of a control's properties anew for every control: half the time of a panel."""
+    return _hints_of(type(self._impl.props))
+
+
+_hints_of = lru_cache(maxsize=256)(get_type_hints)
 
 
 class _NoTunnel:

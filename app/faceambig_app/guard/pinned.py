@@ -21,6 +21,7 @@ PARTS = (
     "infra._infra:_message_producer", "infra._infra:WebsockMessageHandler._handle_incoming_message",
     "infra._async_message_buffer:AsyncMessageBuffer", "_client_autobuild:ensure_client_is_built",
     "_assignable_props_api:AssignablePropsBase._cast_value_recursive",
+    "_assignable_props_api:AssignablePropsBase._prop_hints",
     "_gui_api:GuiApi._handle_gui_updates", "_gui_api:GuiApi._handle_file_transfer_start",
     "_gui_api:GuiApi._handle_file_transfer_part", "_gui_api:GuiApi._resolve_client",
     "_gui_api:print_threadpool_errors", "_gui_handles:UploadedFile",

@@ -5,9 +5,10 @@ from __future__ import annotations
 import errno
 import http
 import ipaddress
+import re
 import socket
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from websockets import Headers
 from websockets.http11 import Request, Response
@@ -29,6 +30,7 @@ HEADERS = {
 LINKLESS = "This page needs its link, with the token: whoever serves it has it."
 LEADERLESS = "This link does not lead the class of this server: take the one that it printed when it started."
 AGAIN = "again"  # in an address: asked for once more
+_LANGUAGE = re.compile(r"([A-Za-z0-9-]{1,40})(?:\s*;\s*[qQ]=([01](?:\.[0-9]{0,3})?))?")
 
 
 def answer(door: Door, address: str, request: Request) -> Response | None:
@@ -138,6 +140,16 @@ def dress(door: Door, address: str, request: Request, response: Response) -> Non
         response.headers[name] = value
     origin = door.access.origin(host, address) or f"http://127.0.0.1:{door.access.port}"
     response.headers["Content-Security-Policy"] = door.page.policy(origin)
+
+
+def preferred(values: Iterable[str]) -> tuple[str, ...]:
+    """The tags of Accept-Language headers (de-AT,de;q=0.9,en;q=0.8), dearest first; what is none is left out."""
+    weighed: list[tuple[float, str]] = []
+    for piece in ",".join(values).split(","):
+        found = _LANGUAGE.fullmatch(piece.strip())
+        if found is not None and (weight := float(found[2] or 1)) > 0:
+            weighed.append((weight, found[1]))
+    return tuple(tag for _, tag in sorted(weighed, key=lambda each: -each[0]))
 
 
 def listen(host: str, port: int) -> socket.socket:

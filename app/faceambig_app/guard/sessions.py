@@ -28,7 +28,8 @@ class Limits:
     """What one browser, and all together, may take."""
 
     sessions: int = 64  # browsers at a time
-    first: float = 30.0  # seconds until a browser shows its camera; a phone compiles shaders before
+    # Seconds until a browser shows its camera. A phone that compiles shaders for longer comes back when it is done
+    first: float = 10.0
     idle: float = (
         3600.0  # seconds without a word; the page comes back by itself when it is looked at
     )
@@ -48,11 +49,19 @@ class Limits:
 class Session:
     """One connection, from its handshake to its end."""
 
-    def __init__(self, limits: Limits, connection: Any, *, leads: bool = False) -> None:
+    def __init__(
+        self,
+        limits: Limits,
+        connection: Any,
+        *,
+        leads: bool = False,
+        languages: tuple[str, ...] = (),
+    ) -> None:
         self._loop = asyncio.get_running_loop()
         self._limits = limits
         self._connection: Any = connection
         self.leads = leads  # whether it came by the link of who leads a class
+        self.languages = languages  # that it asks for, dearest first
         self.shown = False  # whether its first camera has come
         self.at_work = 0
         self.buffer: AsyncMessageBuffer | None = None
@@ -132,6 +141,12 @@ def leads() -> bool:
     """Whether the running connection is of who leads a class; False outside of any."""
     session = SESSION.get()
     return session is not None and session.leads
+
+
+def languages() -> tuple[str, ...]:
+    """Tags of the languages that the running connection's browser asks for, dearest first; none outside of any."""
+    session = SESSION.get()
+    return () if session is None else session.languages
 
 
 async def produce(websocket: Any, buffer: Any, client_id: Any, *rest: Any, **options: Any) -> None:
