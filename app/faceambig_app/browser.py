@@ -27,7 +27,7 @@ from .link import query
 from .notices import cause, from_query
 from .orders import Orders
 from .own_room import OwnRoom
-from .panel import Change, Panel
+from .panel import SIDE_WIDTH, Change, Panel
 from .panel.classroom import Shown
 from .panel.widgets import setting
 from .room import REST, Dispatcher, Room
@@ -49,12 +49,12 @@ from .script import (
 )
 from .stage import Stage
 from .state import DEFAULT, ViewState, changed
-from .style import STYLE
+from .style import STYLE, bold
 from .text import AUTO, accepted, language, say, speaking, words
 
 log = logging.getLogger("faceambig")
 
-FOR_ALL = 1.5  # size of letters of a page that a class looks at
+FOR_ALL = 1.5  # size of letters of a page that a class looks at; lines grow as well
 HELLO = 0.5  # seconds to wait for the page's script to say which state the address asks for
 
 
@@ -84,7 +84,7 @@ class Browser:
         self._greeted = False  # whether the page's script has told its address
         self._owned = False  # whether there is a photograph of this person
         self.language = self._asked = language()  # spoken; what the browser asks for
-        self.stage = Stage(client, self._orbited)
+        self.stage = Stage(client, self._orbited, bold=FOR_ALL if leads else 1.0)
         self._dress()
         self.script = Script(client.gui, self.report)
         self._own = OwnRoom(
@@ -118,18 +118,20 @@ class Browser:
             index: subject.name for index, subject in enumerate(model(DEFAULT.model).subjects, 1)
         }
         people["photo"] = say("own.mine")
+        leads = self._seat is not None and self._seat.may_lead
+        width = round(SIDE_WIDTH * (FOR_ALL if leads and self.stage.wide else 1.0))
         self.panel = panel = Panel(
             self._client.gui, people, self.change, self.act, narrow=self.stage.narrow,
             own=self._own, use_hint=self._use_hint, saving=self._saving,
-            lessons_do=self._lessons, class_do=self._seat, invitation=self._invitation,
+            lessons_do=self._lessons, class_do=self._seat, invitation=self._invitation, width=width,
         )  # fmt: skip
         # A worker may still be drawing for a panel that has been made anew
         self._display = Display(
             self._client, self.stage, panel,
             gone=lambda: self.room.left or self.panel is not panel,
         )  # fmt: skip
-        style = STYLE + figures.hidden_boxes(panel.widgets.step_sliders)
-        panel.places.style.content = style
+        boxes = figures.hidden_boxes(panel.widgets.step_sliders)
+        panel.places.style.content = STYLE + boxes + (bold(width) if leads else "")
         panel.show(self.room.state)
         self._command_palette()
         self._built = True
