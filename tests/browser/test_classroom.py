@@ -85,7 +85,7 @@ def test_a_phone_follows_goes_alone_and_comes_back(visit, served, tmp_path: Path
     phone.tab.screenshot(path=folder / "class-alone.png")
     again.tap()
     phone.until(lambda: phone.state.view == leader.state.view, "it does not come back")
-    assert not tick.is_checked()
+    phone.until(lambda: not tick.is_checked(), "the tick stays")
     phone.do(
         lambda: phone.browser.act("front")
     )  # whoever changes something is alone, and the tick says so
