@@ -34,18 +34,8 @@ PLACEHOLDER = re.compile(r"\{\{(.*?)\}\}")
 MOST_BYTES = 200_000  # of a lesson
 MOST_CHOICES = 5
 TOOLS = (
-    "distance",
-    "actual",
-    "view",
-    "show",
-    "data",
-    "camera",
-    "flex",
-    "glide",
-    "draw",
-    "extremes",
-    "rays",
-)
+    "distance", "actual", "view", "show", "data", "camera", "flex", "glide", "draw", "extremes", "rays",
+)  # fmt: skip
 
 _LESSON: Mapping[str, type] = {"title": str, "goal": str, "minutes": int, "steps": list}
 _STEP: Mapping[str, type] = {

@@ -103,7 +103,7 @@ def a_note_stands_on_all_screens(leader: Visitor, phone: Visitor, folder: Path) 
     """What who leads types, across the scene there and in the sheet of a phone; lines are thicker where it is led."""
     words = "In pairs: what would have to be true for your guess to be right?"
     leader.tab.get_by_label(say("class.note"), exact=True).fill(words)
-    strips = [each.tab.locator(".fa-note") for each in (leader, phone)]
+    strips: list[Any] = [each.tab.locator(".fa-note") for each in (leader, phone)]
     for strip in strips:
         strip.get_by_text(words).wait_for(timeout=PATIENCE)
     scene, across = leader.canvas(), strips[0].bounding_box()
