@@ -73,11 +73,15 @@ class Wire:
         self.send({"type": "CommandTriggerMessage", "uuid": uuid})
 
     def control(self, kind: str, label: str) -> str:
-        """The uuid of a control by its kind, as "Slider", and the start of its label."""
-        for uuid, made in self.controls.items():
-            if made["type"] == f"Gui{kind}Message" and made["props"]["label"].startswith(label):
-                return uuid
-        raise LookupError(f"no {kind} {label!r}")
+        """The uuid of a control by its kind, as "Slider", and the start of its label; one that can be seen, if any."""
+        named = [
+            made
+            for made in self.controls.values()
+            if made["type"] == f"Gui{kind}Message" and made["props"]["label"].startswith(label)
+        ]
+        if not named:
+            raise LookupError(f"no {kind} {label!r}")
+        return next((made for made in named if made["props"]["visible"]), named[0])["uuid"]
 
     # ---------------------------------------------------------------- what comes
 

@@ -27,7 +27,7 @@ from .link import query
 from .notices import cause, from_query
 from .orders import Orders
 from .own_room import OwnRoom
-from .panel import Change, Panel, palette
+from .panel import SIDE_WIDTH, Change, Panel, palette
 from .panel.classroom import Shown
 from .panel.widgets import setting
 from .room import REST, Dispatcher, Room
@@ -49,13 +49,13 @@ from .script import (
 )
 from .stage import Stage
 from .state import DEFAULT, ViewState, changed
-from .style import STYLE
+from .style import STYLE, bold
 from .text import AUTO, accepted, language, say, speaking, words
 from .under import Pointer
 
 log = logging.getLogger("faceambig")
 
-FOR_ALL = 1.5  # size of letters of a page that a class looks at
+FOR_ALL = 1.5  # size of letters of a page that a class looks at; lines grow as well
 HELLO = 0.5  # seconds to wait for the page's script to say which state the address asks for
 
 
@@ -83,7 +83,7 @@ class Browser:
         self._owned = False  # whether there is a photograph of this person
         # Spoken; what the browser asks for: by its request, until the page's script tells
         self.language = self._asked = accepted(guard.languages())
-        self.stage = Stage(client, self._orbited)
+        self.stage = Stage(client, self._orbited, bold=FOR_ALL if leads else 1.0)
         self._dress()
         self.script = Script(client.gui, self.report)
         self._pointer = Pointer(self.script, self.stage.value)
@@ -118,20 +118,21 @@ class Browser:
             index: subject.name for index, subject in enumerate(model(DEFAULT.model).subjects, 1)
         }
         people["photo"] = say("own.mine")
+        leads = self._seat is not None and self._seat.may_lead
+        width = round(SIDE_WIDTH * (FOR_ALL if leads and self.stage.wide else 1.0))
         self.panel = panel = Panel(
             self._client.gui, people, self.change, self.act, narrow=self.stage.narrow,
             own=self._own, use_hint=self._use_hint, saving=self._saving,
-            lessons_do=self._lessons, class_do=self._seat, invitation=self._invitation,
+            lessons_do=self._lessons, class_do=self._seat, invitation=self._invitation, width=width,
         )  # fmt: skip
         # A worker may still be drawing for a panel that has been made anew
         self._display = Display(
             self._client, self.stage, panel,
             gone=lambda: self.room.left or self.panel is not panel,
         )  # fmt: skip
-        style = STYLE + figures.hidden_boxes(panel.widgets.step_sliders)
-        panel.places.style.content = style
+        boxes = figures.hidden_boxes(panel.widgets.step_sliders)
+        panel.places.style.content = STYLE + boxes + (bold(width) if leads else "")
         panel.show(self.room.state)
-        leads = self._seat is not None and self._seat.may_lead
         palette.register(self._client.gui, self.act, () if leads else ("reveal",))
         self._built = True
         if self._seat is not None:

@@ -6,21 +6,20 @@ again. Answers are counted, never named, and go with the browser that gave them:
 
 from __future__ import annotations
 
-import itertools
 import logging
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from html import escape
 
+from .class_page import bars_html, note_html
+from .fields import tidy
 from .lesson_room import Place
 from .lessons import Ask, Lessons
-from .panel.classroom import Shown
+from .panel.classroom import NOTE_LENGTH, Shown
 from .state import DEFAULT, ViewState, changed, for_eyes_of
 from .text import say
 
 log = logging.getLogger("faceambig")
-
-BINS = 5  # bars of a question that asks for a number
 
 
 class Classroom:
@@ -30,6 +29,7 @@ class Classroom:
         """lessons: asked for at every use, as their words are of whoever is spoken to."""
         self.state: ViewState | None = None  # of who leads, or led last; None: nobody has
         self.revealed: set[Place] = set()
+        self.note = ""  # that all may read
         self.private = (
             False  # whether who leads shows a photograph of their own, which stays theirs
         )
@@ -74,6 +74,13 @@ class Classroom:
         self.revealed.add(place)
         for seat in list(self._seats):
             _safely(seat.reveal, place)
+
+    def write(self, note: str) -> None:
+        """A note for all, as far as a line of words goes; "" takes it away."""
+        note = tidy(note, NOTE_LENGTH)
+        if note != self.note:
+            self.note = note
+            self.show(everybody=True)
 
     def answer(self, seat: Seat, place: Place, answer: float) -> None:
         """One answer a browser: the last."""
@@ -169,6 +176,15 @@ class Seat:
         """Be where the class is."""
         self._go(for_eyes_of(state, self._now()))
 
+    def explore(self, alone: bool) -> None:
+        """Go on alone, or be with the class again."""
+        if not alone:
+            self.follow_again()
+        elif self.following and not self.leads:
+            self.following = False
+            self.show()
+            self._room.show()
+
     def follow_again(self) -> None:
         """Back to the class."""
         if self.leads or self.following:
@@ -185,6 +201,11 @@ class Seat:
             self.following = False
             self._room.take(self)
             self._room.lead(self._now())
+
+    def note(self, words: str) -> None:
+        """A note for the class; of who leads only."""
+        if self.leads:
+            self._room.write(words)
 
     def holds(self, place: Place, answer: float) -> bool:
         """Take an answer; whether the class waits for what it hides. Alone, or without a leader, nobody waits."""
@@ -227,6 +248,9 @@ class Seat:
                 alone=not self.leads and not self.following,
                 hidden=hidden,
                 may_take=self.may_lead and not self.leads,
+                leads=self.leads,
+                note=room.note,
+                strip=note_html(room.note),
             )
         )  # fmt: skip
 
@@ -238,33 +262,6 @@ class Seat:
         if not self.following:
             return say("class.alone")
         return say("class.private") if room.private else say("class.follows")
-
-
-def bars_html(ask: Ask, answers: list[float], present: int) -> str:
-    """How often each answer was given, without names. answers: as `Classroom.answers` has them."""
-    counted = _counts(ask, answers)
-    most = max((count for _, count in counted), default=0) or 1
-    rows = "".join(
-        f"<li><span>{escape(words)}</span><span>{count}</span>"
-        + (f'<i style="width:{100 * count / most:.1f}%"></i></li>' if count else "</li>")
-        for words, count in counted
-    )
-    title = escape(say("class.answers", count=len(answers), present=present))
-    return f'<div class="fa"><b>{title}</b><ul class="fa-bars">{rows}</ul></div>'
-
-
-def _counts(ask: Ask, answers: list[float]) -> list[tuple[str, int]]:
-    """Each choice and how often it was given; numbers in BINS ranges of equal width."""
-    if ask.number is None:
-        return [(words, answers.count(k)) for k, words in enumerate(ask.choices)]
-    low, high, unit = ask.number.low, ask.number.high, ask.number.unit
-    bins = min(BINS, high - low + 1)
-    edges = [low + round(k * (high - low + 1) / bins) for k in range(bins + 1)]
-    return [
-        (say("class.range", low=start, high=end - 1, unit=unit),
-         sum(start <= min(high, max(low, round(answer))) < end for answer in answers))
-        for start, end in itertools.pairwise(edges)
-    ]  # fmt: skip
 
 
 def _safely(call: Callable[..., None], *given: object) -> None:

@@ -263,10 +263,10 @@ def _is_of_words(character: str) -> bool:
     )
 
 
-def tidy(text: str) -> str:
-    """The nearest text that a pin's name may be: what is typed is cut, never refused."""
+def tidy(text: str, most: int = PIN_NAME_LENGTH) -> str:
+    """The nearest text that a pin's name, or another line of `most` characters, may be: cut, never refused."""
     plain = "".join(filter(_is_of_words, " ".join(text.split())))
-    return " ".join(plain[:PIN_NAME_LENGTH].split())
+    return " ".join(plain[:most].split())
 
 
 def _modes(field: Field, value: Any) -> tuple[tuple[int, float], ...]:

@@ -53,8 +53,10 @@ class Board:
 class HeadNodes:
     """Two meshes (coarse while a hand moves) and a board."""
 
-    def __init__(self, client: viser.ClientHandle, head: Head) -> None:
+    def __init__(self, client: viser.ClientHandle, head: Head, bold: float = 1.0) -> None:
+        """bold: times that words and lines are larger."""
         scene, root = client.scene, f"/{head.name}"
+        self._bold = bold
         self._root = scene.add_frame(root, show_axes=False)
         self._faces, self._coarse_faces = head.faces, head.coarse_faces
         vertices = head.vertices.astype(np.float32)
@@ -69,9 +71,11 @@ class HeadNodes:
         self._board = scene.add_frame(f"{root}/board", show_axes=False)
         self._title = scene.add_label(f"{root}/board/title", head.title, anchor="bottom-center")
         self._bar = scene.add_line_segments(
-            f"{root}/board/bar", _bar(0.05), GREY, thickness=2.0, thickness_units="screen",
+            f"{root}/board/bar", _bar(0.05), GREY, thickness=2.0 * bold, thickness_units="screen",
         )  # fmt: skip
-        self._foot = scene.add_label(f"{root}/board/foot", "", anchor="top-center")
+        self._foot = scene.add_label(
+            f"{root}/board/foot", "", anchor="top-center", font_screen_scale=bold
+        )
         # Directly below the root, where both meshes stand: the first of the fine vertices are the coarse ones
         self._colours = add_colours(scene, root, shaded(head))
         self._painted: object = head.colours
@@ -139,7 +143,7 @@ class HeadNodes:
             return
         self._title.text, self._foot.text = board.title, board.foot
         fits = board.room / (LETTER * max(1, len(board.title)))
-        self._title.font_screen_scale = float(np.clip(fits, SMALLEST, 1.0))
+        self._title.font_screen_scale = float(np.clip(fits, SMALLEST, self._bold))
         self._foot.visible = bool(board.foot)
         self._bar.visible = board.bar > 0
         if board.bar > 0:
@@ -160,10 +164,11 @@ class HeadNodes:
             return
         self._board.wxyz = wxyz
         lines = 1 + self._wanted.foot.count("\n")
-        at = max(BAR_AT, END + (MARGIN + LINE * lines) * sight.pixel - sight.below)
+        line = self._bold * LINE
+        at = max(BAR_AT, END + (MARGIN + line * lines) * sight.pixel - sight.below)
         self._title.position = (
             0.0,
-            min(TITLE_AT, sight.above - (MARGIN + LINE) * sight.pixel),
+            min(TITLE_AT, sight.above - (MARGIN + line) * sight.pixel),
             0.0,
         )
         self._bar.position = (0.0, at, 0.0)

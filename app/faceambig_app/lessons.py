@@ -33,7 +33,9 @@ NUMBERS = "numbers.json"  # what tools/lessons.py has computed
 PLACEHOLDER = re.compile(r"\{\{(.*?)\}\}")
 MOST_BYTES = 200_000  # of a lesson
 MOST_CHOICES = 5
-TOOLS = ("actual", "view", "show", "data", "camera", "flex", "glide", "draw", "extremes", "rays")
+TOOLS = (
+    "distance", "actual", "view", "show", "data", "camera", "flex", "glide", "draw", "extremes", "rays",
+)  # fmt: skip
 
 _LESSON: Mapping[str, type] = {"title": str, "goal": str, "minutes": int, "steps": list}
 _STEP: Mapping[str, type] = {

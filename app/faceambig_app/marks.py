@@ -26,10 +26,10 @@ NAME_SCALE = 0.8  # of viser's 12 pixels
 class PointNodes:
     """The marks of one tone on one head."""
 
-    def __init__(self, scene: viser.SceneApi, marks: Marks) -> None:
+    def __init__(self, scene: viser.SceneApi, marks: Marks, bold: float = 1.0) -> None:
         self._scene, self._root = scene, f"/{marks.head}/{marks.tone}"
         self._frame = scene.add_frame(self._root, show_axes=False)
-        self._tone = marks.tone
+        self._tone, self._bold = marks.tone, bold
         self._crosses: viser.LineSegmentsHandle | None = None
         self._discs: viser.PointCloudHandle | None = None
         self._words: list[viser.LabelHandle] = []
@@ -67,13 +67,13 @@ class PointNodes:
             self._draw_discs(sight)
 
     def _draw_crosses(self, sight: Sight) -> None:
-        right, up = min(CROSS * sight.pixel, LARGEST["seen"]) * sight.board[:, :2].T
+        right, up = min(self._bold * CROSS * sight.pixel, LARGEST["seen"]) * sight.board[:, :2].T
         arms = np.array([[-right - up, right + up], [-right + up, right - up]])
         segments = (self._points[:, None, None, :] + arms).reshape(-1, 2, 3).astype(np.float32)
         if self._crosses is None:
             self._crosses = self._scene.add_line_segments(
                 f"{self._root}/crosses", segments, TONES[self._tone],
-                thickness=2.0, thickness_units="screen",
+                thickness=2.0 * self._bold, thickness_units="screen",
             )  # fmt: skip
         else:
             self._crosses.points = segments
@@ -87,19 +87,21 @@ class PointNodes:
             )  # fmt: skip
         self._discs.points = points
         # Half: viser draws points twice as wide
-        self._discs.point_size = 0.5 * min(DISC * sight.pixel, LARGEST["d_l"])
+        self._discs.point_size = 0.5 * min(self._bold * DISC * sight.pixel, LARGEST["d_l"])
 
     def _name(self, names: tuple[str, ...], sight: Sight) -> None:
         while len(self._words) > len(names):
             self._words.pop().remove()
-        beside = BESIDE * sight.pixel * sight.board[:, 0] + NAME_LIFT * sight.board[:, 2]
+        beside = (
+            self._bold * BESIDE * sight.pixel * sight.board[:, 0] + NAME_LIFT * sight.board[:, 2]
+        )
         for index, name in enumerate(names):
             at = self._points[index] + beside
             if index == len(self._words):
                 self._words.append(
                     self._scene.add_label(
                         f"{self._root}/name{index}", name, position=at, anchor="center-left",
-                        font_screen_scale=NAME_SCALE, depth_test=True,
+                        font_screen_scale=NAME_SCALE * self._bold, depth_test=True,
                     )
                 )  # fmt: skip
             self._words[index].text, self._words[index].position = name, at
@@ -112,10 +114,10 @@ class PointNodes:
 class LineNodes:
     """The straight lines of one name in the room of one head."""
 
-    def __init__(self, scene: viser.SceneApi, lines: Lines) -> None:
+    def __init__(self, scene: viser.SceneApi, lines: Lines, bold: float = 1.0) -> None:
         self._handle = scene.add_line_segments(
             f"/{lines.head}/{lines.name}", np.zeros((1, 2, 3), dtype=np.float32),
-            TONES.get(lines.tone, TONES["dim"]), thickness=1.4, thickness_units="screen",
+            TONES.get(lines.tone, TONES["dim"]), thickness=1.4 * bold, thickness_units="screen",
         )  # fmt: skip
 
     def show(self, lines: Lines, pivot: NDArray[np.float64], visible: bool) -> None:

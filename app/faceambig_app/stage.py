@@ -50,8 +50,11 @@ READ_AMBIENT, READ_SHARE = 2.3, 0.3
 class Stage:
     """The 3D nodes of one browser. `orbited` hears where a hand has turned the viewer to: see viewer.Orbited."""
 
-    def __init__(self, client: viser.ClientHandle, orbited: Orbited | None = None) -> None:
-        self._client, self._scene = client, client.scene
+    def __init__(
+        self, client: viser.ClientHandle, orbited: Orbited | None = None, *, bold: float = 1.0
+    ) -> None:
+        """bold: times that lines, marks and words are larger, for eyes at the far end of a room."""
+        self._client, self._scene, self._bold = client, client.scene, bold
         self._heads: dict[str, HeadNodes] = {}
         # Of each head's meshes: vertices, as the one array they came in, and pivot
         self._where: dict[str, tuple[NDArray[np.float64], tuple[float, ...]] | None] = {}
@@ -73,6 +76,11 @@ class Stage:
     def narrow(self) -> bool:
         """Whether there is no room for a second panel."""
         return self._viewer.narrow
+
+    @property
+    def wide(self) -> bool:
+        """Whether there is room for wider panels."""
+        return self._viewer.wide
 
     def value(self, head: str, vertex: int) -> float | None:
         """What the colour of a head at a vertex means: see HeadNodes.value. None too if there is no such head."""
@@ -96,7 +104,7 @@ class Stage:
         for head in scene.heads:
             nodes = self._heads.get(head.name)
             if nodes is None:
-                nodes = self._heads[head.name] = HeadNodes(self._client, head)
+                nodes = self._heads[head.name] = HeadNodes(self._client, head, self._bold)
             seen = not through or _at_camera(scene, head) is not None
             if seen:
                 # A hand on the distance moves the fitted face alone
@@ -106,7 +114,7 @@ class Stage:
                     self._where.pop(head.name, None)  # if this fails, they are nowhere known
                     nodes.show(_points(scene, head), head, draft)
                     self._where[head.name] = where
-            nodes.write(None if through else _board(scene, head, self._viewer.sight))
+            nodes.write(None if through else _board(scene, head, self._viewer.sight, self._bold))
             nodes.stand(0.0 if through else head.slot - middle, seen)
         self._mark(scene, draft)
         self._read_colours(all(head.lit for head in scene.heads))
@@ -136,12 +144,12 @@ class Stage:
         for mark in scene.marks:
             key = (mark.head, mark.tone)
             if key not in self._points:
-                self._points[key] = PointNodes(self._scene, mark)
+                self._points[key] = PointNodes(self._scene, mark, self._bold)
             self._points[key].show(mark, pivot, self._viewer.sight, draft, visible)
         for line in scene.lines:
             key = (line.head, line.name)
             if key not in self._lines:
-                self._lines[key] = LineNodes(self._scene, line)
+                self._lines[key] = LineNodes(self._scene, line, self._bold)
             self._lines[key].show(line, pivot, visible)
 
     def _take_turns(self, scene: Scene) -> None:
@@ -230,7 +238,7 @@ def _shares(scene: Scene, head: Head) -> bool:
     return any(other.slot == head.slot for other in scene.heads if other.name != head.name)
 
 
-def _board(scene: Scene, head: Head, sight: Sight) -> Board | None:
+def _board(scene: Scene, head: Head, sight: Sight, bold: float) -> Board | None:
     """The words of a slot, with its first head; None for the others. No lines where they would cross the next ones."""
     together = [other for other in scene.heads if other.slot == head.slot]
     if together[0].name != head.name:
@@ -239,4 +247,4 @@ def _board(scene: Scene, head: Head, sight: Sight) -> Board | None:
     lines = tuple(text for other in together for text, _ in other.caption)
     apart = [abs(other.slot - head.slot) for other in scene.heads if other.slot != head.slot]
     room = min(apart, default=np.inf) / sight.pixel
-    return Board(title, scene.scale_bar, lines if room > LINE_ROOM else (), room)
+    return Board(title, scene.scale_bar, lines if room > LINE_ROOM * bold else (), room)

@@ -65,6 +65,9 @@ _ROOM = """
 #fa-room{background:#FFF;color:#1D2733;border:0;border-radius:12px;padding:16px;max-width:92vw}
 #fa-room svg{width:min(78vh,88vw)}#fa-room p{text-align:center;font-size:20px;width:min(78vh,88vw);margin:.4em 0 0}
 #fa-room::backdrop{background:#0009}
+.fa-note{background:var(--fa-ink);color:var(--mantine-color-body);border-left:4px solid var(--fa-ds);border-radius:8px;
+font-size:calc(17px*var(--fa-scale,1));line-height:1.35;font-weight:600;padding:.45em .7em;overflow-wrap:anywhere;
+margin:.3em calc(10.5px*var(--fa-scale,1))}
 """
 
 _PHOTO = """
@@ -117,6 +120,25 @@ button[aria-pressed=true]{background:var(--fa-dl)!important;color:var(--fa-on)!i
 STYLE = f"<style>{_TOKENS}{_TEXT}{_CARDS}{_LESSON}{_ROOM}{_PHOTO}{_PLOTS}{_VISER}</style>"
 
 
+# For eyes at the far end of a room. Widths in percent are of the photograph, others of the plot's own units
+_BOLD = """
+.fa-plot polyline{stroke-width:3.6px}.fa-plot path[stroke="var(--fa-ink)"]:not([stroke-width="6"],[stroke-width="3"]){
+stroke-width:2.4px}.fa-plot path[stroke="var(--fa-dim)"]{stroke-width:1.8px}.fa-plot path[stroke="var(--fa-line)"]{
+stroke-width:1.6px}.fa-plot .far{stroke-width:2.4px}
+.fa-photo use{stroke-width:.62%}.fa-photo [stroke="#FFF"] use,.fa-photo use[stroke="#FFF"]{stroke-width:1.2%}
+.fa-key path{stroke-width:2.6px!important}.fa-card,.fa-said,.fa-note{border-left-width:7px!important}
+.fa-tasks span{border-width:2.5px}.fa-bars i{height:16px}
+@media(min-width:1100px){.fa-note{position:fixed;bottom:16px;left:50%;transform:translateX(-50%);margin:0;
+width:max-content;max-width:calc(100vw - 2*var(--fa-side) - 32px)}}
+@media(min-width:1800px){.fa-plot{width:100%}}
+"""
+
+
 def text_size(scale: float) -> str:
     """The size of all text, 1 to 2, as a style."""
     return f"<style>:root{{--fa-scale:{min(LARGEST, max(SMALLEST, scale)):g}}}</style>"
+
+
+def bold(side: int) -> str:
+    """Thicker lines, and the note across the scene. side: pixels of each panel beside it."""
+    return f"<style>:root{{--fa-side:{side}px}}{_BOLD}</style>"

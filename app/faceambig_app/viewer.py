@@ -27,6 +27,7 @@ BESIDE = 0.12  # metres: half a head and a little air, beyond the outermost slot
 HAND_COUNTS = 10.0  # seconds: a hand's last move may be told so much later on a slow machine
 STEEPEST = 89.0  # degrees: straight from above "up" has no direction
 NARROW = 1100  # pixels: two panels of 372 leave too little for two heads
+WIDE = 1800  # pixels: of a projector; panels of 558 leave 700 for two heads
 PHONE = 577  # pixels: at most 576 wide, viser shows its panel as a sheet over the lower part
 PHONE_HEADS_AT = 0.19  # share of the height, from the top, where the heads stand above the sheet
 FIRST_POSITION, FIRST_FOV = (
@@ -71,6 +72,7 @@ class Viewer:
             0 < client.camera.image_width < PHONE
         )  # viser's panel is a sheet over the scene
         self.narrow = 0 < client.camera.image_width < NARROW  # no room for a second panel
+        self.wide = client.camera.image_width >= WIDE  # room for panels half as wide again
         self.sight = Sight(np.eye(3), 2 * ZOOM_1 / 800, ZOOM_1, ZOOM_1)
         self._view: View | Lens | None = None
         self._half_width = 0.0  # metres beside the centre that must be seen

@@ -68,6 +68,11 @@ readers.report = ({ uuid }) => {
   });
 };
 
+// ---- no wider than the window -------------------------------------------------------------------------------------------
+// A list that opens stands beyond the edge for a moment. A phone would zoom out for it and lay the page out wider, which
+// moves the list on: it never came to rest. Zooming in stays possible.
+document.querySelector("meta[name=viewport]")?.setAttribute("content", "width=device-width, initial-scale=1, minimum-scale=1");
+
 // ---- style --------------------------------------------------------------------------------------------------------------
 // A finger needs 24 px; viser's thumb is 8 by 12. The half width beyond the ends of the track is padding of the row.
 const style = document.createElement("style");

@@ -16,11 +16,12 @@ from typing import Any
 import pytest
 
 from faceambig_app import drawn, guard, server
-from faceambig_app.classroom import Classroom, Seat, bars_html
+from faceambig_app.class_page import bars_html
+from faceambig_app.classroom import Classroom, Seat
 from faceambig_app.lessons import Ask, Number, lessons
-from faceambig_app.panel.classroom import Shown
+from faceambig_app.panel.classroom import NOTE_LENGTH, Shown
 from faceambig_app.state import DEFAULT, ViewState, changed
-from faceambig_app.text import say
+from faceambig_app.text import say, speaking
 
 SOON = 60.0  # seconds: other tests share the processors
 FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
@@ -157,6 +158,30 @@ def test_five_follow_one_goes_alone_and_comes_back(lead, come):
     assert rest_at(alone, there)
     late = come("distance=0.4")
     assert rest_at(late, there)  # who comes later is where the class is
+
+
+@pytest.mark.parametrize("language", ["en", "de"])
+def test_a_tick_goes_alone_and_comes_back_and_a_note_is_read_by_all(lead, come, language):
+    leader, wire = lead("lang=" + language), come("lang=" + language)
+    with speaking(language):
+        tick, note = say("class.explore"), say("class.note")
+        alone, follows = say("class.alone"), say("class.follows")
+        leads, distance = say("class.leads", present=1, following=0), say("field.distance")
+    wire.set(wire.control("Checkbox", tick), True)
+    assert says(wire, alone)
+    assert says(leader, leads)
+    leader.set(leader.control("Slider", distance), 70)
+    assert at(leader, "distance", r"[0-9.]+")
+    assert "distance" not in wire.query
+    wire.set(wire.control("Checkbox", tick), False)
+    assert at(wire, "distance", r"[0-9.]+")
+    assert says(wire, follows)
+    leader.set(leader.control("Text", note), "  <b>2 & 3</b>  ")
+    for each in (leader, wire):
+        assert each.wait(lambda e=each: "&lt;b&gt;2 &amp; 3&lt;/b&gt;" in e.shown, SOON)
+    wire.set(wire.control("Text", note), "of a follower")  # it is not shown there, and is not heard
+    wire.read(0.3)
+    assert "of a follower" not in leader.shown + wire.shown
 
 
 def test_eyes_are_each_ones_own(lead, come):
@@ -308,6 +333,37 @@ def test_who_does_not_lead_reveals_nothing():
     assert late.told == [PLACE]
     other.seat.take()  # it has not come by the leader's link
     assert leader.seat.leads
+
+
+def test_who_explores_alone_is_left_alone_until_back():
+    room = Classroom(lessons)
+    leader, other = Chair(room, may_lead=True), Chair(room)
+    other.seat.explore(True)
+    assert other.shown.alone
+    leader.move(distance=0.5)
+    assert other.state == DEFAULT
+    other.seat.explore(True)  # again says nothing new
+    assert other.shown.alone
+    other.seat.explore(False)
+    assert other.state == leader.state
+    assert not other.shown.alone
+    leader.seat.explore(True)
+    assert (leader.seat.leads, leader.shown.leads, leader.shown.alone) == (True, True, False)
+
+
+def test_a_note_is_a_line_of_who_leads():
+    room = Classroom(lessons)
+    leader, other = Chair(room, may_lead=True), Chair(room)
+    leader.seat.note("a\n\u202eb " + NOTE_LENGTH * "c")
+    assert leader.shown.note == other.shown.note == "a b " + (NOTE_LENGTH - 4) * "c"
+    other.seat.note("no")
+    assert room.note.startswith("a b c")
+    leader.seat.leave()  # it stays with all else
+    assert "a b c" in other.shown.strip
+    again = Chair(room, may_lead=True)
+    assert again.shown.note == room.note
+    again.seat.note(" ")
+    assert (other.shown.strip, again.shown.note) == ("", "")
 
 
 def test_numbers_are_counted_in_ranges():

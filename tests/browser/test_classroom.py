@@ -13,6 +13,9 @@ from faceambig_app.text import say
 from visitor import PATIENCE, Visitor, artefacts
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
+# Pixels of the picture's own; percents are of the diagonal of its frame, by the square root of two
+WIDTH = """e => { const width = getComputedStyle(e).strokeWidth, frame = e.ownerSVGElement.viewBox.baseVal;
+  return parseFloat(width) * (width.endsWith("%") ? Math.hypot(frame.width, frame.height) / Math.SQRT2 / 100 : 1) }"""
 
 
 @pytest.fixture(scope="module")
@@ -70,14 +73,53 @@ def test_a_phone_follows_goes_alone_and_comes_back(visit, served, tmp_path: Path
     phone.until(lambda: "numbers" not in phone.state.hide, "the key reveals nothing")
     leader.tab.screenshot(path=folder / "class-revealed.png")
     follows(phone).wait_for(timeout=PATIENCE)
-    phone.do(lambda: phone.browser.act("side"))
+    tick = phone.tab.get_by_role("checkbox", name=say("class.explore"), exact=True)
     again = phone.tab.get_by_role("button", name=say("class.again"), exact=True)
+    assert not again.is_visible()
+    tick.tap()
     again.wait_for(timeout=PATIENCE)
+    leader.do(lambda: leader.browser.act("side"))
+    leader.rest()
+    assert phone.state.view != leader.state.view
     phone.rest()
     phone.tab.screenshot(path=folder / "class-alone.png")
     again.tap()
     phone.until(lambda: phone.state.view == leader.state.view, "it does not come back")
+    phone.until(lambda: not tick.is_checked(), "the tick stays")
+    phone.do(
+        lambda: phone.browser.act("front")
+    )  # whoever changes something is alone, and the tick says so
+    phone.until(tick.is_checked, "no tick")
+    tick.tap()
+    phone.until(lambda: phone.state.view == leader.state.view, "the tick does not lead back")
+    a_note_stands_on_all_screens(leader, phone, folder)
     leader.tab.goto("about:blank")
     phone.tab.get_by_text(say("class.gone"), exact=True).wait_for(timeout=PATIENCE)
     leader.tab.goto(served.leader_link)
     follows(phone).wait_for(timeout=PATIENCE)
+
+
+def a_note_stands_on_all_screens(leader: Visitor, phone: Visitor, folder: Path) -> None:
+    """What who leads types, across the scene there and in the sheet of a phone; lines are thicker where it is led."""
+    words = "In pairs: what would have to be true for your guess to be right?"
+    leader.tab.get_by_label(say("class.note"), exact=True).fill(words)
+    strips: list[Any] = [each.tab.locator(".fa-note") for each in (leader, phone)]
+    for strip in strips:
+        strip.get_by_text(words).wait_for(timeout=PATIENCE)
+    scene, across = leader.canvas(), strips[0].bounding_box()
+    assert across["x"] >= scene["x"]
+    assert across["x"] + across["width"] <= scene["x"] + scene["width"]
+    assert across["y"] + across["height"] <= 800
+    in_sheet = strips[1].bounding_box()
+    assert in_sheet["x"] >= 0
+    assert in_sheet["x"] + in_sheet["width"] <= 390
+    for part in (".fa-plot polyline", ".fa-photo use"):
+        thick, thin = (each.tab.locator(part).first.evaluate(WIDTH) for each in (leader, phone))
+        assert thick > 1.4 * thin, part
+    bars = [each.browser.stage._heads["fit"]._bar.thickness for each in (leader, phone)]
+    assert bars[0] == 1.5 * bars[1]
+    leader.tab.screenshot(path=folder / "class-note.png")
+    phone.tab.screenshot(path=folder / "class-note-phone.png")
+    leader.tab.get_by_label(say("class.note"), exact=True).fill("")
+    for strip in strips:
+        strip.wait_for(state="detached", timeout=PATIENCE)

@@ -1,18 +1,21 @@
-"""A learner in Chromium goes through lessons from start to end: by mouse, by touch on a phone, by keyboard alone.
+"""A learner in Chromium goes through the lessons from start to end: by mouse, by touch on a phone, by keyboard alone.
 
-FACEAMBIG_LESSONS=all takes every lesson both ways, some minutes. Pictures of every step are in FACEAMBIG_ARTEFACTS.
+What is done comes from the lessons' files. FACEAMBIG_LESSONS=all takes every lesson both ways, some minutes.
+Pictures of every step are in FACEAMBIG_ARTEFACTS.
 """
 
 from __future__ import annotations
 
 import os
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from faceambig_app.lessons import Lesson, Step, lessons
+from faceambig_app.state import changed
 from faceambig_app.text import say
 from visitor import Visitor, artefacts
 
@@ -21,8 +24,9 @@ pytestmark = [pytest.mark.browser, pytest.mark.slow]
 ALL = lessons().by_number
 EVERY = os.environ.get("FACEAMBIG_LESSONS") == "all"
 PHONE = {"width": 390, "height": 844, "has_touch": True, "is_mobile": True}
-# What is cut off, or makes the panel scroll sideways
-CUT = """() => { const cut = [];
+# What is cut off, or makes the page or the panel scroll sideways
+CUT = """() => { const cut = [], root = document.documentElement;
+  if (root.scrollWidth > root.clientWidth) cut.push(`page: ${root.scrollWidth} in ${root.clientWidth}`);
   for (const e of document.querySelectorAll('.fa-lesson, .fa-lesson *, .mantine-Button-label'))
     if (e.checkVisibility() && e.clientWidth > 2 && e.scrollWidth > e.clientWidth + 1)
       cut.push(`${e.textContent}: ${e.scrollWidth} in ${e.clientWidth}`);
@@ -32,6 +36,20 @@ CUT = """() => { const cut = [];
   for (const e of document.querySelectorAll('.mantine-ScrollArea-viewport'))
     if (e.scrollWidth > e.clientWidth + 1) cut.push(`sideways: ${e.scrollWidth} in ${e.clientWidth}`);
   return cut }"""
+# What is red in the lesson: letters, borders, grounds. The brown of the surface difference is not there
+RED = """() => { const red = [];
+  for (const e of document.querySelectorAll('.fa-lesson, .fa-lesson *, .mantine-Notification-root')) {
+    const style = getComputedStyle(e), widths = style.borderLeftWidth;
+    for (const colour of [style.color, style.backgroundColor, widths === '0px' ? '' : style.borderLeftColor]) {
+      const [r, g, b, a] = (colour.match(/[0-9.]+/g) ?? []).map(Number);
+      if (e.checkVisibility() && a !== 0 && r - Math.max(g, b) > 60 && g < 110)
+        red.push(`${colour}: ${e.textContent}`) } }
+  return red }"""
+# Whether a pointer at the middle of an element reaches it, wholly inside the window
+REACHED = """e => { const box = e.getBoundingClientRect(), x = box.x + box.width / 2, y = box.y + box.height / 2;
+  const at = document.elementFromPoint(x, y);
+  return box.left >= 0 && box.right <= innerWidth && box.top >= 0 && box.bottom <= innerHeight
+    && (e.contains(at) || at?.contains(e)) }"""
 
 
 class Hand:
@@ -41,11 +59,20 @@ class Hand:
         self.me, self.finger = me, finger
 
     def press(self, name: str) -> None:
-        button = self.me.tab.get_by_role("button", name=name, exact=True).first
-        button.tap() if self.finger else button.click()
+        button = self.me.tab.get_by_role("button", name=name, exact=True).locator("visible=true")
+        self.reach(button.first)
+        self.hit(button.first)
+
+    def hit(self, element: Any) -> None:
+        element.tap() if self.finger else element.click()
+
+    def reach(self, element: Any) -> None:
+        """Bring it into view; nothing may lie over it."""
+        element.scroll_into_view_if_needed()
+        self.me.until(lambda: element.evaluate(REACHED), f"out of reach: {element}")
 
     def slide(self, slider: Any, share: float) -> None:
-        slider.scroll_into_view_if_needed()
+        self.reach(slider)
         if not self.finger:
             self.me.drag(slider, share)
             return
@@ -58,18 +85,25 @@ class Hand:
     def begin(self, lesson: Lesson) -> None:
         box = self.me.tab.get_by_label(say("field.lesson"), exact=True).first
         option = self.me.tab.get_by_role("option", name=f"{lesson.number} {lesson.title}")
-        box.click()
-        option.click()
+        self.hit(box)
+        self.hit(option)
 
     def guess(self, step: Step) -> str:
         assert step.ask is not None
         if step.ask.number is None:
-            self.press(step.ask.choices[0])
-            return step.ask.choices[0]
+            wrong = next(
+                words for words in step.ask.choices if not step.ask.answer.startswith(words)
+            )
+            self.press(wrong)
+            return wrong
         unit = step.ask.number.unit
         self.me.tab.get_by_label(say("lesson.number", unit=unit)).fill("7")
         self.press(say("lesson.say"))
         return f"7 {unit}"
+
+    def seen(self, elements: Any) -> Any:
+        """The first that is not hidden."""
+        return elements.locator("visible=true").first
 
     def do(self, task: str) -> None:
         """What a lesson's condition asks for, as a person would do it."""
@@ -81,14 +115,14 @@ class Hand:
         match name:
             case "distance":
                 self.slide(
-                    tab.get_by_role("slider", name=say("field.distance")).first,
+                    self.seen(tab.get_by_role("slider", name=say("field.distance"))),
                     1.0 if high else 0.0,
                 )
             case "actual":
                 share = 0.95 if high else 0.08  # 0.2 to 5 m, logarithmic
-                self.slide(tab.get_by_role("slider", name=say("field.actual")).first, share)
+                self.slide(self.seen(tab.get_by_role("slider", name=say("field.actual"))), share)
             case "flex":
-                slider = tab.get_by_role("slider", name=re.compile("^A: ")).first
+                slider = self.seen(tab.get_by_role("slider", name=re.compile("^A: ")))
                 self.slide(slider, 1.0 if high else 0.0)
             case "view":
                 self.press(say(f"view.{value}"))
@@ -121,29 +155,53 @@ def go_through(me: Visitor, lesson: Lesson, hand: Any, name: str, folder: Path) 
             say("lesson.step", number=number, count=len(lesson.steps), title=step.title)
         ).wait_for()
         if step.ask is not None:
-            if "numbers" in step.state.hide:
-                me.until(
-                    lambda: me.tab.locator(".fa-card span").all_inner_texts()[:2] == ["?", "?"],
-                    "the numbers can be seen before the answer",
-                )
+            me.rest()
+            asked(me, step)
             look(me, f"{name}_{lesson.number}_{number}_asked", folder)
             said = hand.guess(step)
             text.get_by_text(say("lesson.said", words=said)).wait_for()
-            if not {"truth", "numbers"} & set(step.state.hide) - {"numbers"}:
-                me.until(
-                    lambda: "?" not in "".join(me.tab.locator(".fa-card span").all_inner_texts()),
-                    "the numbers stay hidden",
-                )
+            assert me.tab.evaluate(RED) == []
+            assert words_of(step.answered) in words_of(text.inner_text())
+            me.until(
+                lambda: (
+                    "numbers" not in me.state.hide
+                    and ("truth" in me.state.hide or "?" not in cards(me))
+                ),
+                "the numbers stay hidden",
+            )
         for k, task in enumerate(tasks):
             assert text.locator(".fa-done").count() == k
             hand.do(task)
             me.until(lambda k=k: text.locator(".fa-done").count() == k + 1, f"no tick: {task}")
+        me.rest()
         look(me, f"{name}_{lesson.number}_{number}", folder)
         if number < len(lesson.steps):
             hand.press(say("action.lesson_next"))
     hand.press(say("action.lesson_leave"))
     me.until(lambda: me.state.lesson is None, "the lesson does not end")
     text.wait_for(state="detached")
+
+
+def asked(me: Visitor, step: Step) -> None:
+    """Before the answer nothing is told that comes after it; the numbers, where the step hides them, are nowhere."""
+    text = words_of(me.tab.locator(".fa-lesson").first.inner_text())
+    assert words_of(step.answered) not in text
+    assert me.tab.locator(".fa-tasks").count() == 0
+    if "numbers" in step.state.hide:
+        assert cards(me).count("?") == 2
+        assert me.tab.locator(".fa-plot polyline").count() == 0
+        spoken = me.tab.locator(".fa-spoken").all_inner_texts()
+        assert not re.search(r"error \d|difference \d", " ".join(spoken))
+
+
+def cards(me: Visitor) -> str:
+    """The two large numbers."""
+    return " ".join(me.tab.locator(".fa-card span").all_inner_texts()[:2])
+
+
+def words_of(text: str) -> str:
+    """The words alone, without Markdown and line ends."""
+    return " ".join(text.replace("*", "").split())
 
 
 def look(me: Visitor, name: str, folder: Path) -> None:
@@ -155,22 +213,50 @@ def look(me: Visitor, name: str, folder: Path) -> None:
     )
 
 
-@pytest.mark.parametrize("number", sorted(ALL) if EVERY else [1])
-def test_a_lesson_by_mouse(visit, tmp_path, number):
+@pytest.fixture(scope="module")
+def desk(visit: Callable[..., Visitor]) -> Hand:
+    """A mouse at a desk."""
     size = {"width": 1440, "height": 900, "dpr": 0.4} if EVERY else {}
-    me = visit(**size)
-    hand = Hand(me, finger=False)
-    hand.begin(ALL[number])
-    go_through(me, ALL[number], hand, "desktop", artefacts(tmp_path))
-    me.tab.context.close()
+    return Hand(visit(**size), finger=False)
+
+
+@pytest.fixture(scope="module")
+def phone(visit: Callable[..., Visitor]) -> Hand:
+    """A finger on a phone."""
+    return Hand(visit(**PHONE), finger=True)
+
+
+@pytest.mark.parametrize("number", sorted(ALL) if EVERY else [1])
+def test_a_lesson_by_mouse(desk, tmp_path, number):
+    desk.begin(ALL[number])
+    go_through(desk.me, ALL[number], desk, "desktop", artefacts(tmp_path))
 
 
 @pytest.mark.parametrize("number", sorted(ALL) if EVERY else [2])
-def test_a_lesson_by_touch_on_a_phone(visit, tmp_path, number):
-    me = visit(**PHONE, query=f"lesson={number}")
-    hand = Hand(me, finger=True)
-    go_through(me, ALL[number], hand, "phone", artefacts(tmp_path))
-    me.tab.context.close()
+def test_a_lesson_by_touch_on_a_phone(phone, tmp_path, number):
+    phone.begin(ALL[number])
+    go_through(phone.me, ALL[number], phone, "phone", artefacts(tmp_path))
+
+
+def test_a_finger_moves_the_sheet_and_finds_the_slider_beside_the_words(phone):
+    me, slider = phone.me, say("field.distance")
+    phone.begin(ALL[1])
+    me.until(lambda: me.state.lesson == 1, "the lesson is not chosen")
+    me.do(lambda: me.browser.change(lambda state: changed(state, step=3)))
+    me.tab.locator(".fa-tasks").first.wait_for()
+    at = phone.seen(me.tab.get_by_role("slider", name=slider)).bounding_box()
+    words = me.tab.locator(".fa-tasks").first.bounding_box()
+    assert 0 < at["y"] - words["y"] < 150  # seen with the words, and above the photograph
+    sheet = me.tab.locator(".fa-lesson").first
+    before = sheet.bounding_box()["y"]
+    send = me.tab.context.new_cdp_session(me.tab).send
+    for kind, y in (("Start", 750), *(("Move", y) for y in range(740, 400, -20)), ("End", 0)):
+        points = [] if kind == "End" else [{"x": 195, "y": y}]
+        send("Input.dispatchTouchEvent", {"type": f"touch{kind}", "touchPoints": points})
+    me.until(lambda: sheet.bounding_box()["y"] < before - 200, "the sheet does not follow")
+    me.do(lambda: me.browser.act("lesson_leave"))
+    me.until(lambda: me.state.lesson is None, "the lesson does not end")
+    me.rest()
 
 
 class Keys(Hand):

@@ -22,7 +22,7 @@ Photograph = tuple[
     viser.GuiHtmlHandle, viser.GuiHtmlHandle, viser.GuiHtmlHandle, viser.GuiHtmlHandle
 ]
 
-SIDE_WIDTH = 372  # pixels of each docked panel
+SIDE_WIDTH = 372  # pixels of each docked panel, where letters are of the usual size
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,9 @@ class Panel:
         lessons_do: lessons.Does,
         class_do: classroom.Does | None = None,
         invitation: str = "",
+        width: int = SIDE_WIDTH,
     ) -> None:
+        """width: pixels of each docked panel."""
         self.widgets = w = Widgets(gui, tell, act)
         gui.set_panel_label(say("app.title"))
         style = gui.add_html("")
@@ -71,14 +73,14 @@ class Panel:
 
         if narrow:  # one panel: the photograph comes first, beside the numbers
             self.classroom = build_class()
-            photo = self._photo(w, lessons_do)
+            photo = self._photo(w, lessons_do, narrow)
         else:
             side = gui.add_panel()
             with side.add_tab(say("panel.photo")):
                 self.classroom = build_class()
-                photo = self._photo(w, lessons_do)
+                photo = self._photo(w, lessons_do, narrow)
             side.dock_left()
-            side.set_width(SIDE_WIDTH)
+            side.set_width(width)
         tabs = gui.add_tab_group()
         with tabs.add_tab(say("panel.explore")):
             explore.build_first(w)
@@ -97,14 +99,14 @@ class Panel:
             self.export = export.build(w, saving)
         spoken, told = gui.add_html(""), gui.add_html("")
         gui.main_panel.dock_right()
-        gui.main_panel.set_width(SIDE_WIDTH)
+        gui.main_panel.set_width(width)
         folded = self.flex.words, self.flex.spectrum
         self.places = Places(style, *photo, cards, plots, legend, *folded, pins, spoken, told)
 
-    def _photo(self, w: Widgets, lessons_do: lessons.Does) -> Photograph:
+    def _photo(self, w: Widgets, lessons_do: lessons.Does, narrow: bool) -> Photograph:
         """The places of the heading, the photograph, its crosses and its circles; the lesson between them."""
         heading = w.gui.add_html("")
-        self.lesson = lessons.Lessons(w, lessons_do)
+        self.lesson = lessons.Lessons(w, lessons_do, narrow=narrow)
         photo = w.gui.add_html(""), w.gui.add_html(""), w.gui.add_html("")
         self.lesson.build_list()
         return heading, *photo

@@ -52,7 +52,8 @@ class Does(Protocol):
 class Lessons:
     """The widgets of the lessons; `build_list` makes the last of them, below the photograph."""
 
-    def __init__(self, w: Widgets, does: Does) -> None:
+    def __init__(self, w: Widgets, does: Does, *, narrow: bool) -> None:
+        """narrow: there is one panel, and the tab Explore far below the lesson."""
         self._w, self._does = w, does
         self._shown = Shown()
         self._on: dict[str, bool] = {}  # names of what can be seen
@@ -78,6 +79,8 @@ class Lessons:
                 for name in ("glide", "draw", "extremes", "rays")
             },
         }
+        if narrow:
+            self._tools["distance"] = (w.distance("distance", visible=False),)
         self._steps = w.actions(
             "lesson_step", ("lesson_back", "lesson_next", "lesson_leave"), visible=False
         )
