@@ -16,7 +16,7 @@ import pytest
 
 from faceambig.scene import Head, Lines, Marks, Scene, View
 from faceambig_app import guard, stage, viewer
-from faceambig_app.heads import shaded
+from faceambig_app.heads import APART, LETTER, fitted, shaded
 from faceambig_app.marks import CROSS, DISC
 from faceambig_app.stage import Stage
 from faceambig_app.viewer import LENS, ZOOM_1
@@ -177,14 +177,14 @@ def test_heads_of_one_slot_are_drawn_over_each_other_under_one_title(enter):
     assert client.node("/fit/head").opacity is None
     assert client.node("/fit/board").visible
     assert not client.node("/true/board").visible
-    assert client.node("/fit/board/title").text == "Face that fits / True face"
+    assert client.node("/fit/board/title0").text == "Face that fits / True face"
     assert np.abs(client.node("/fit").position).max() == 0
     gone = replace(overlaid().heads[1], opacity=0.0)
     shown.show(replace(overlaid(), heads=(overlaid().heads[0], gone)), False)
     assert not client.node("/true/head").visible
     shown.show(scene(), False)
     assert client.node("/true/head").opacity is None
-    assert client.node("/true/board/title").text == "True face"
+    assert client.node("/true/board/title0").text == "True face"
 
 
 def blinking(shown: Stage) -> dict[str, Any]:
@@ -250,18 +250,18 @@ def test_the_bar_is_true_and_in_the_picture_at_any_zoom(enter, zoom, size):
     )
     bar = client.node("/true/board/bar")
     assert np.ptp(bar.points[:, :, 0]) == pytest.approx(0.02, rel=1e-6)
-    assert client.node("/true/board/foot").text == "20\u202fmm"
+    assert client.node("/true/board/foot0").text == "20\u202fmm"
     middle = client.node("/true").position * (
         0,
         1,
         1,
     )  # zoomed in, the heads are partly beside the picture
-    for name in ("bar", "title", "foot"):
+    for name in ("bar", "title0", "foot0"):
         at = middle + client.node(f"/true/board/{name}").position
         assert np.abs(in_picture(client, at)).max() < 1, name
     shown.show(replace(scene(), scale_bar=0.0), False)
     assert not bar.visible
-    assert not client.node("/true/board/foot").visible
+    assert not client.node("/true/board/foot0").visible
 
 
 def test_zoom_and_rise_are_the_views(enter):
@@ -421,9 +421,29 @@ def test_a_draft_moves_the_coarse_mesh_and_rest_brings_both(enter):
 
 
 def test_words_below_a_narrow_row_give_way(enter):
-    for width, lines in ((1400, 3), (390, 1)):
+    for width, lines in ((1400, 3), (760, 4), (390, 1)):  # of 760 one is parted
         client, shown = enter(width, 800)
         shown.show(strip(), False)
-        assert len(client.node("/fit2/board/foot").text.split("\n")) == lines
+        words = shown._heads["fit2"]._foot.lines
+        assert len(words) == lines
+        nodes = [client.node(f"/fit2/board/foot{k}") for k in range(lines)]
+        assert [node.text for node in nodes] == words
+        heights = [node.position[1] for node in nodes]
+        assert heights == sorted(heights, reverse=True)
+        assert all(abs(node.position[0]) < 1e-9 for node in nodes)  # each in the middle
         assert stage.LINE_ROOM > 100
         client.scene.reset()
+
+
+def test_words_of_neighbours_do_not_touch():
+    texts = ["Pin 1, assumed 30\u202fcm", "surface difference 2.8\u202fmm"]
+    for room in (60.0, 80.0, 140.0, 400.0, np.inf):
+        lines, scale = fitted(texts, room, 0.7)
+        assert " ".join(lines) == " ".join(texts)
+        assert 0.7 <= scale <= 1
+        assert not any(line.endswith("30") for line in lines)  # a number keeps its unit
+        if room > 80:  # the longest word and its unit have room
+            assert max(map(len, lines)) * scale * LETTER <= room - APART
+    assert fitted(texts, 400.0, 0.7) == (texts, 1.0)
+    assert len(fitted(texts[:1], 80.0, 0.7)[0]) == 2
+    assert fitted([""], 80.0, 0.7)[0] == []

@@ -247,7 +247,7 @@ def test_turning_the_head_changes_the_photograph(me):
     shown = "() => getComputedStyle(document.querySelector('.fa-photo')).backgroundImage"
     picture = me.tab.evaluate(shown)
     me.open("Pose of the head in the photo")
-    slider = me.slider("Turn")
+    slider = me.slider("Turn (\u00b0)")
     slider.wait_for(timeout=PATIENCE)
     me.press_on(slider, *4 * ("ArrowRight",))
     me.until(lambda: me.tab.evaluate(shown) != picture, "the photograph stayed")
