@@ -61,7 +61,8 @@ class Words:
     def __init__(
         self, scene: viser.SceneApi, name: str, anchor: Literal["bottom-center", "top-center"]
     ) -> None:
-        self._scene, self._name, self._anchor = scene, name, anchor
+        self._scene, self._name = scene, name
+        self._anchor: Literal["bottom-center", "top-center"] = anchor
         self._labels: list[viser.LabelHandle] = []
         self.lines: list[str] = []
 

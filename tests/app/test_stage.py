@@ -374,6 +374,21 @@ def test_through_the_camera_both_faces_keep_their_pixels(enter):
     shown.show(scene(through_camera=True), False)  # side by side: the fitted face alone
     assert not client.node("/true").visible
     assert client.node("/fit").visible
+    assert np.tan(client.camera.fov / 2) == pytest.approx(half, rel=1e-9)
+    # Its title is where the face is; no bar is true of all depths
+    away = client.node("/fit/board").position[2]
+    assert away == pytest.approx(-photo.fit_vertices[:, 2].mean(), rel=1e-6)
+    assert client.node("/fit/board/title0").text == "Face that fits"
+    assert not client.node("/fit/board/bar").visible
+    # Alone, it is zoomed to the photograph's eyes; over the true face it is not
+    wide = replace(photo, fit_eyes=1.02)
+    shown.show(replace(scene(through_camera=True), photo=wide), False)
+    assert np.tan(client.camera.fov / 2) == pytest.approx(1.02 * half, rel=1e-9)
+    shown.show(replace(overlaid(through_camera=True), photo=wide), False)
+    assert np.tan(client.camera.fov / 2) == pytest.approx(half, rel=1e-9)
+    shown.show(scene(), False)
+    assert client.node("/fit/board").position == pytest.approx((0, 0, 0))
+    assert client.node("/fit/board/bar").visible
 
 
 def test_colours_of_a_legend_are_sent_as_they_are_and_read_in_even_light(enter):

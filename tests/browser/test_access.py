@@ -80,6 +80,7 @@ def test_on_every_tab_axe_finds_nothing_and_keys_reach_everything(desk, axe):
         assert len(wanted) > 2, tab  # of them two in the bar above
         assert all(wanted), f"{tab}: something has no name"
         assert not found_by_axe(desk), tab
+        assert not found_in_the_other_scheme(desk), tab
         assert sorted(walked(desk)) == sorted(wanted), tab
 
 
@@ -93,6 +94,22 @@ def test_on_a_phone_in_the_dark_axe_finds_nothing(phone, axe):
         unfold(phone)
         assert len(phone.tab.evaluate(CONTROLS)) > 2, tab
         assert not found_by_axe(phone), tab
+        assert not found_in_the_other_scheme(phone), tab
+
+
+def found_in_the_other_scheme(me: Visitor) -> list[str]:
+    """What axe finds of contrast, all that changes, in the dark for the light and the other way round."""
+    scheme = "() => document.documentElement.dataset.mantineColorScheme"
+    here = me.tab.evaluate(scheme)
+    other = {"dark": "light", "light": "dark"}[here]
+    found: list[str] = []
+    for now in (other, here):
+        me.tab.emulate_media(color_scheme=now)
+        me.until(lambda now=now: me.tab.evaluate(scheme) == now, f"the page does not turn {now}")
+        if now == other:
+            me.tab.wait_for_timeout(200)  # colours of buttons fade
+            found = found_by_axe(me, "color-contrast")
+    return found
 
 
 def walked(me: Visitor) -> list[str]:
