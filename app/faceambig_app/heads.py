@@ -33,6 +33,7 @@ LETTER, APART = (
     7.0,
     10,
 )  # pixels: of a letter of usual size, and from the words of one head to those of the next
+LINE_ROOM = 125  # pixels that a line below a head may need
 SMALLEST_TITLE, SMALLEST_LINE = 0.7, 0.85  # share of it that letters of a narrow row may have
 END = 0.003  # metres: half the height of the bar's ends
 GREY = (120, 134, 148)  # of the bar, readable on both grounds
@@ -46,13 +47,12 @@ class Board:
     title: str
     bar: float  # metres; 0: none
     lines: tuple[str, ...]  # below the bar
-    room: float = np.inf  # pixels to the next head
+    room: float = np.inf  # metres to the next head
 
-    @property
-    def foot(self) -> tuple[str, ...]:
-        """The words below the bar."""
+    def foot(self, room: float) -> tuple[str, ...]:
+        """The words below the bar, with `room` pixels to the next head: no lines where they would be too small."""
         length = (say("stage.bar", mm=f"{1e3 * self.bar:g}"),) if self.bar > 0 else ()
-        return (*length, *self.lines)
+        return (*length, *self.lines) if room > LINE_ROOM else length
 
 
 class Words:
@@ -113,6 +113,7 @@ class HeadNodes:
         self._offset = 0.0  # metres along the viewer's right
         self._depth = 0.0  # metres, of the words before the viewer who stands at the root
         self._wanted: Board | None = Board(head.title, 0.0, (), 0.0)  # no scene's
+        self._said: object = None  # the words there are: (board, pixels of room)
         self._placed: object = (
             None  # what the nodes stand for: viser compares every vector anew, at 50 us each
         )
@@ -170,11 +171,16 @@ class HeadNodes:
         self._board.visible = board is not None
         if board is None:
             return
-        self._title.write([board.title], board.room, SMALLEST_TITLE)
-        self._foot.write(board.foot, board.room, SMALLEST_LINE)
         self._bar.visible = board.bar > 0
         if board.bar > 0:
             self._bar.points = _bar(board.bar)
+
+    def _say(self, board: Board, room: float) -> None:
+        """The words in a room of so many pixels, which panels take away that come after the heads."""
+        if self._said != (board, room):
+            self._said = board, room
+            self._title.write([board.title], room, SMALLEST_TITLE)
+            self._foot.write(board.foot(room), room, SMALLEST_LINE)
 
     def stand(self, offset: float, visible: bool = True, depth: float = 0.0) -> None:
         """In the row, `offset` metres along the viewer's right, the words `depth` before him; `place` puts it there."""
@@ -190,6 +196,7 @@ class HeadNodes:
         self._root.position = self._offset * sight.board[:, 0]
         if self._wanted is None:
             return
+        self._say(self._wanted, self._wanted.room / sight.pixel)
         self._board.wxyz, self._board.position = wxyz, (0.0, 0.0, -self._depth)
         line, above, below = LINE * sight.pixel, len(self._title.lines), len(self._foot.lines)
         at = max(BAR_AT, END + (MARGIN + LINE * below) * sight.pixel - sight.below)

@@ -36,7 +36,6 @@ TO_WORLD = np.array(
     [1.0, -1.0, -1.0]
 )  # camera axes (y down, z forward) to the page's (y up, z to the viewer)
 BLINK_SECONDS = 0.5  # each: once round a second
-LINE_ROOM = 125  # pixels that a line below a head may need
 LIGHTS = (  # direction towards the light in viewer axes (right, up, back), colour, intensity: key from above left
     ("key", (-0.5, 0.7, 1.2), (255, 244, 232), 2.8),
     ("fill", (0.9, 0.1, 0.8), (235, 242, 255), 0.7),
@@ -110,7 +109,7 @@ class Stage:
                 if not (same and nodes.keep(head, draft)):
                     nodes.show(_points(scene, head), head, draft)
                     self._where[head.name] = where
-            nodes.write(_board(scene, head, self._viewer.sight))
+            nodes.write(_board(scene, head))
             nodes.stand(0.0 if through else head.slot - middle, seen, depth)
         self._mark(scene, draft)
         self._read_colours(all(head.lit for head in scene.heads))
@@ -234,8 +233,8 @@ def _shares(scene: Scene, head: Head) -> bool:
     return any(other.slot == head.slot for other in scene.heads if other.name != head.name)
 
 
-def _board(scene: Scene, head: Head, sight: Sight) -> Board | None:
-    """The words of a slot, with its first head; None for the others. No lines where they would cross the next ones."""
+def _board(scene: Scene, head: Head) -> Board | None:
+    """The words of a slot, with its first head; None for the others."""
     together = [other for other in scene.heads if other.slot == head.slot]
     if together[0].name != head.name:
         return None
@@ -244,5 +243,4 @@ def _board(scene: Scene, head: Head, sight: Sight) -> Board | None:
         return Board(title, 0.0, ())
     lines = tuple(text for other in together for text, _ in other.caption)
     apart = [abs(other.slot - head.slot) for other in scene.heads if other.slot != head.slot]
-    room = min(apart, default=np.inf) / sight.pixel
-    return Board(title, scene.scale_bar, lines if room > LINE_ROOM else (), room)
+    return Board(title, scene.scale_bar, lines, min(apart, default=np.inf))

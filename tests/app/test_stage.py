@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from faceambig.scene import Head, Lines, Marks, Scene, View
-from faceambig_app import guard, stage, viewer
+from faceambig_app import guard, viewer
 from faceambig_app.heads import APART, LETTER, fitted, shaded
 from faceambig_app.marks import CROSS, DISC
 from faceambig_app.stage import Stage
@@ -446,8 +446,16 @@ def test_words_below_a_narrow_row_give_way(enter):
         heights = [node.position[1] for node in nodes]
         assert heights == sorted(heights, reverse=True)
         assert all(abs(node.position[0]) < 1e-9 for node in nodes)  # each in the middle
-        assert stage.LINE_ROOM > 100
         client.scene.reset()
+
+
+def test_words_give_way_when_panels_come_after_the_heads(enter):
+    client, shown = enter(1400, 800)
+    shown.show(strip(), False)
+    assert len(shown._heads["fit2"]._foot.lines) == 3
+    client.camera.image_width = 760
+    asyncio.run(client.camera.heard(client.camera))
+    assert len(shown._heads["fit2"]._foot.lines) == 4
 
 
 def test_words_of_neighbours_do_not_touch():
