@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Literal
 
 import pytest
 
@@ -100,15 +101,16 @@ def test_on_a_phone_in_the_dark_axe_finds_nothing(phone, axe):
 def found_in_the_other_scheme(me: Visitor) -> list[str]:
     """What axe finds of contrast, all that changes, in the dark for the light and the other way round."""
     scheme = "() => document.documentElement.dataset.mantineColorScheme"
-    here = me.tab.evaluate(scheme)
-    other = {"dark": "light", "light": "dark"}[here]
-    found: list[str] = []
-    for now in (other, here):
+    dark = me.tab.evaluate(scheme) == "dark"
+
+    def turn(now: Literal["light", "dark"]) -> None:
         me.tab.emulate_media(color_scheme=now)
-        me.until(lambda now=now: me.tab.evaluate(scheme) == now, f"the page does not turn {now}")
-        if now == other:
-            me.tab.wait_for_timeout(200)  # colours of buttons fade
-            found = found_by_axe(me, "color-contrast")
+        me.until(lambda: me.tab.evaluate(scheme) == now, f"the page does not turn {now}")
+
+    turn("light" if dark else "dark")
+    me.tab.wait_for_timeout(200)  # colours of buttons fade
+    found = found_by_axe(me, "color-contrast")
+    turn("dark" if dark else "light")
     return found
 
 

@@ -114,6 +114,7 @@ def colours_are_the_legends(me: Visitor) -> None:
     """Of what faces the viewer: pixels as the legend has them, so that a value read by eye is right."""
     nodes = me.browser.stage._heads["fit"]
     values, colours = nodes._values, np.asarray(nodes._painted, dtype=int)
+    assert values is not None
     at = np.array(me.tab.evaluate(PLACES, "/fit/head"))
     front = (at[:, 2] > 0.9) & (nodes._full.vertices[:, 2] > 0.02) & np.isfinite(values)
     png = Image.open(io.BytesIO(me.tab.screenshot(style=HIDE))).convert("RGB")
