@@ -91,6 +91,9 @@ class Photo:
         None  # (V, 3) the fitted face in camera axes, for the view "camera"
     )
     fit_focal: float | None = None  # pixels, per metre of depth as `focal`
+    fit_eyes: float = (
+        1.0  # distance of the fitted face's eyes in the picture, for that of the observed ones
+    )
     pixels: NDArray[np.uint8] | None = None  # (height, width, 3) a real photograph, drawn instead
     points_shown: bool = True
     names_shown: bool = False

@@ -20,17 +20,18 @@ SMALL = """() => [...document.querySelectorAll(
   .filter(e => e.checkVisibility()).map(e => [e, e.getBoundingClientRect()])
   .filter(([, box]) => box.width && (box.width < 24 || box.height < 24))
   .map(([e, box]) => `${e.ariaLabel || e.textContent || e.className}: ${box.width} by ${box.height}`)"""
-AXE = """async () => (await axe.run(document, { resultTypes: ['violations'] })).violations.flatMap(
+AXE = """async rules => (await axe.run(document, { resultTypes: ['violations'],
+  ...(rules.length && { runOnly: rules }) })).violations.flatMap(
   found => found.nodes.map(node => [found.impact, found.id, node.html.slice(0, 200), node.failureSummary]))"""
 # viser's own, that no style and no name of ours mends: (rule, part of the element) -> reason
 VISERS: dict[tuple[str, str], str] = {}
 
 
-def found_by_axe(me: Visitor) -> list[str]:
-    """Serious and critical findings, without viser's."""
+def found_by_axe(me: Visitor, *rules: str) -> list[str]:
+    """Serious and critical findings of `rules`, of all if none is named; without viser's."""
     return [
         f"{rule}: {html}: {why}"
-        for impact, rule, html, why in me.tab.evaluate(AXE)
+        for impact, rule, html, why in me.tab.evaluate(AXE, list(rules))
         if impact in ("serious", "critical")
         and not any(rule == known and part in html for known, part in VISERS)
     ]

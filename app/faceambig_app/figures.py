@@ -26,9 +26,13 @@ from .text import NARROW, distance_text, numeral, percent_number, say
 
 
 def hidden_boxes(uuids: Iterable[str]) -> str:
-    """Hide the number boxes of sliders that count steps: the box would show the step, not the distance."""
-    selectors = ",".join(f'[id="{uuid}"]+div' for uuid in uuids)
-    return f"<style>{selectors}{{display:none}}</style>"
+    """Hide the number boxes of sliders that count steps: the box would show the step, not the distance.
+
+    In their place is room for half a thumb, which at the far end would stand under the bar of scrolling.
+    """
+    sliders = [f'[id="{uuid}"]' for uuid in uuids]
+    boxes = ",".join(f"{slider}+div" for slider in sliders)
+    return f"<style>{boxes}{{display:none}}{','.join(sliders)}{{margin-right:8px}}</style>"
 
 
 def heading(assumed: float | None, actual: float | None, points: int) -> str:

@@ -6,8 +6,12 @@ first of them.
 
 from __future__ import annotations
 
+import textwrap
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import zip_longest
+from typing import Literal
 
 import numpy as np
 import viser
@@ -25,10 +29,12 @@ MARGIN, LINE, AIR = (
     15,
     4,
 )  # pixels: to the edge of what is seen, of a line of words, from bar to words
-LETTER, SMALLEST = (
+LETTER, APART = (
     7.0,
-    0.7,
-)  # pixels of a letter, and the smallest share of it a narrow row may have
+    10,
+)  # pixels: of a letter of usual size, and from the words of one head to those of the next
+LINE_ROOM = 125  # pixels that a line below a head may need
+SMALLEST_TITLE, SMALLEST_LINE = 0.7, 0.85  # share of it that letters of a narrow row may have
 END = 0.003  # metres: half the height of the bar's ends
 GREY = (120, 134, 148)  # of the bar, readable on both grounds
 OCCLUSION_POWER = 1.3  # without it nostrils and ears glow (no shadows)
@@ -41,13 +47,44 @@ class Board:
     title: str
     bar: float  # metres; 0: none
     lines: tuple[str, ...]  # below the bar
-    room: float = np.inf  # pixels to the next head
+    room: float = np.inf  # metres to the next head
 
-    @property
-    def foot(self) -> str:
-        """The words below the bar."""
+    def foot(self, room: float) -> tuple[str, ...]:
+        """The words below the bar, with `room` pixels to the next head: no lines where they would be too small."""
         length = (say("stage.bar", mm=f"{1e3 * self.bar:g}"),) if self.bar > 0 else ()
-        return "\n".join((*length, *self.lines))
+        return (*length, *self.lines) if room > LINE_ROOM else length
+
+
+class Words:
+    """Words above or below a head, each line in the middle: viser's labels have theirs to the left."""
+
+    def __init__(
+        self,
+        scene: viser.SceneApi,
+        name: str,
+        anchor: Literal["bottom-center", "top-center"],
+        bold: float = 1.0,
+    ) -> None:
+        """bold: times that they are larger."""
+        self._scene, self._name, self._bold = scene, name, bold
+        self._anchor: Literal["bottom-center", "top-center"] = anchor
+        self._labels: list[viser.LabelHandle] = []
+        self.lines: list[str] = []
+
+    def write(self, texts: Sequence[str], room: float, smallest: float) -> None:
+        """Each in a line, where there is `room` for it (pixels, of letters of usual size): smaller, then in several."""
+        self.lines, scale = fitted(texts, room, smallest)
+        for _ in range(len(self.lines) - len(self._labels)):
+            name = f"{self._name}{len(self._labels)}"
+            self._labels.append(self._scene.add_label(name, "", anchor=self._anchor))
+        for label, text in zip_longest(self._labels, self.lines):
+            label.visible = text is not None
+            label.text, label.font_screen_scale = text or "", self._bold * scale
+
+    def place(self, first: float, step: float) -> None:
+        """The first line `first` metres above the pivot, each other `step` lower."""
+        for k, label in enumerate(self._labels[: len(self.lines)]):
+            label.position = (0.0, first - k * step, 0.0)
 
 
 class HeadNodes:
@@ -69,13 +106,11 @@ class HeadNodes:
                 f"{root}/draft", vertices[: self._n_coarse], head.coarse_faces, visible=False
             )
         self._board = scene.add_frame(f"{root}/board", show_axes=False)
-        self._title = scene.add_label(f"{root}/board/title", head.title, anchor="bottom-center")
+        self._title = Words(scene, f"{root}/board/title", "bottom-center", bold)
         self._bar = scene.add_line_segments(
             f"{root}/board/bar", _bar(0.05), GREY, thickness=2.0 * bold, thickness_units="screen",
         )  # fmt: skip
-        self._foot = scene.add_label(
-            f"{root}/board/foot", "", anchor="top-center", font_screen_scale=bold
-        )
+        self._foot = Words(scene, f"{root}/board/foot", "top-center", bold)
         # Directly below the root, where both meshes stand: the first of the fine vertices are the coarse ones
         self._colours = add_colours(scene, root, shaded(head))
         self._painted: object = head.colours
@@ -83,7 +118,9 @@ class HeadNodes:
         self._looks: object = None  # of the meshes: (draft, seen, opacity)
         self._values = head.values_mm
         self._offset = 0.0  # metres along the viewer's right
+        self._depth = 0.0  # metres, of the words before the viewer who stands at the root
         self._wanted: Board | None = Board(head.title, 0.0, (), 0.0)  # no scene's
+        self._said: object = None  # the words there are: (board, pixels of room)
         self._placed: object = (
             None  # what the nodes stand for: viser compares every vector anew, at 50 us each
         )
@@ -141,42 +178,60 @@ class HeadNodes:
         self._board.visible = board is not None
         if board is None:
             return
-        self._title.text, self._foot.text = board.title, board.foot
-        fits = board.room / (LETTER * max(1, len(board.title)))
-        self._title.font_screen_scale = float(np.clip(fits, SMALLEST, self._bold))
-        self._foot.visible = bool(board.foot)
         self._bar.visible = board.bar > 0
         if board.bar > 0:
             self._bar.points = _bar(board.bar)
 
-    def stand(self, offset: float, visible: bool = True) -> None:
-        """In the row, `offset` metres along the viewer's right; `place` puts it there."""
+    def _say(self, board: Board, room: float) -> None:
+        """The words in a `room` of pixels as `Words.write` has it; panels that come after the heads take of it."""
+        if self._said != (board, room):
+            self._said = board, room
+            self._title.write([board.title], room, SMALLEST_TITLE)
+            self._foot.write(board.foot(room), room, SMALLEST_LINE)
+
+    def stand(self, offset: float, visible: bool = True, depth: float = 0.0) -> None:
+        """In the row, `offset` metres along the viewer's right, the words `depth` before him; `place` puts it there."""
         self._root.visible = visible
-        self._offset = offset
+        self._offset, self._depth = offset, depth
 
     def place(self, sight: Sight, wxyz: NDArray[np.float64]) -> None:
         """Stand along the viewer's right; the board faces the viewer and stays inside what is seen."""
-        if self._placed == (sight, self._offset, self._wanted):
+        placed = (sight, self._offset, self._depth, self._wanted)
+        if self._placed == placed:
             return
-        self._placed = (sight, self._offset, self._wanted)
+        self._placed = placed
         self._root.position = self._offset * sight.board[:, 0]
         if self._wanted is None:
             return
-        self._board.wxyz = wxyz
-        lines = 1 + self._wanted.foot.count("\n")
-        line = self._bold * LINE
-        at = max(BAR_AT, END + (MARGIN + line * lines) * sight.pixel - sight.below)
-        self._title.position = (
-            0.0,
-            min(TITLE_AT, sight.above - (MARGIN + line) * sight.pixel),
-            0.0,
-        )
+        self._say(self._wanted, self._wanted.room / sight.pixel / self._bold)
+        self._board.wxyz, self._board.position = wxyz, (0.0, 0.0, -self._depth)
+        above, below = len(self._title.lines), len(self._foot.lines)
+        line, margin = self._bold * LINE * sight.pixel, MARGIN * sight.pixel
+        at = max(BAR_AT, END + margin + line * below - sight.below)
+        self._title.place(min(TITLE_AT + (above - 1) * line, sight.above - margin - line), line)
         self._bar.position = (0.0, at, 0.0)
-        self._foot.position = (0.0, at - END - AIR * sight.pixel, 0.0)
+        self._foot.place(at - END - AIR * sight.pixel, line)
 
     def remove(self) -> None:
         """Take the head and all that stands on it out of the scene."""
         self._root.remove()
+
+
+def fitted(texts: Sequence[str], room: float, smallest: float) -> tuple[list[str], float]:
+    """Lines of the words of `texts` and the share of their size, so that they stay off what is `room` pixels away.
+
+    No word is parted, and no number from its unit, between which is no usual space.
+    """
+    lines: list[str] = []
+    room = max(1.0, room - APART)
+    for text in texts:
+        if room < smallest * LETTER * len(text):
+            letters = max(1, int(room / (smallest * LETTER)))
+            lines += textwrap.wrap(text, letters, break_long_words=False)
+        elif text:
+            lines.append(text)
+    longest = max(map(len, lines), default=1)
+    return lines, float(np.clip(room / (LETTER * longest), smallest, 1.0))
 
 
 def _bar(length: float) -> NDArray[np.float32]:

@@ -34,10 +34,10 @@ font-variant-numeric:tabular-nums;line-height:1.15;display:block}
 .fa-card i{font-style:normal;font-size:calc(14px*var(--fa-scale,1))}
 .fa-dl{border-color:var(--fa-dl)}.fa-dl span{color:var(--fa-dl)}
 .fa-ds{border-color:var(--fa-ds)}.fa-ds span{color:var(--fa-ds)}
-.fa-both{display:flex;flex-wrap:wrap;align-items:start}.fa-both>*{flex:1 1 46%;min-width:0}
-.fa-both>:last-child{flex:999 1 calc(160px*var(--fa-scale,1))}
-.fa-both .fa{padding-right:0}
-.fa-both .fa+.fa{padding-right:.75em}.fa-both .fa-cards{grid-template-columns:1fr}
+.fa-both{display:flex;flex-wrap:wrap;align-items:start;gap:4px 10px;padding:0 .75em .35em}
+.fa-both>.fa:first-child{display:contents}.fa-both .fa-photo{order:1;flex:1 1 40%}
+.fa-both>.fa:last-child{order:2;flex:999 1 calc(160px*var(--fa-scale,1));min-width:0;padding:0}
+.fa-both .fa-key{order:3;flex:1 1 100%;padding-top:0}.fa-both .fa-cards{grid-template-columns:1fr}
 .fa-bars{list-style:none;margin:.3em 0;padding:0}.fa-bars li{display:grid;grid-template-columns:1fr auto;gap:0 8px}
 .fa-bars i{grid-column:1/3;height:8px;border-radius:2px;background:var(--fa-ds);margin-bottom:4px;min-width:1px}
 .fa-legend{display:flex;gap:0 6px;align-items:start;font-variant-numeric:tabular-nums}

@@ -12,7 +12,7 @@ from ..boundary import occluding_boundary
 from ..camera import Camera, camera_points, project
 from ..fitting import Fit
 from ..model import Subject
-from ..observation import Observation
+from ..observation import Observation, eye_distance
 from ..scene import Photo
 from .colours import CLAY, skin
 from .face import Face
@@ -104,7 +104,18 @@ def with_fit(picture: Photo, face: Face, *, whole: bool, draw_from: float = DRAW
         projected=face.projected,
         fit_vertices=camera_points(camera, face.own_vertices, draw_from),
         fit_focal=camera.focal if camera.focal is not None else camera.s * draw_from,
+        fit_eyes=_eyes(face),
     )
+
+
+def _eyes(face: Face) -> float:
+    """The eye distance of the projected points for that of the observed ones; 1 where an eye has no point."""
+    scheme = face.observation.scheme
+    if not isinstance(scheme, str):
+        return 1.0
+    rows = face.fit.model.scheme(scheme)
+    share = eye_distance(face.projected, rows) / eye_distance(face.observation.points, rows)
+    return float(share) if np.isfinite(share) and share > 0 else 1.0
 
 
 def outline(face: Face) -> Array:

@@ -199,6 +199,10 @@ def test_a_name_is_typed_beside_its_pin_and_follows_the_state():
     assert second.value == "Near" + "x" * 26
     panel.show(changed(state, pins=[DEFAULT]))
     assert not second.visible
+    remove = gui.widgets["Remove all pins"]
+    assert remove.visible
+    panel.show(DEFAULT)
+    assert not remove.visible  # there is nothing to remove
 
 
 def test_pins_are_listed_with_their_distances_and_an_empty_list_says_what_to_do():

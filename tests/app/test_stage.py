@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from faceambig.scene import Head, Lines, Marks, Scene, View
-from faceambig_app import guard, stage, viewer
-from faceambig_app.heads import shaded
+from faceambig_app import guard, viewer
+from faceambig_app.heads import APART, LETTER, fitted, shaded
 from faceambig_app.marks import CROSS, DISC
 from faceambig_app.stage import Stage
 from faceambig_app.viewer import LENS, ZOOM_1
@@ -177,14 +177,14 @@ def test_heads_of_one_slot_are_drawn_over_each_other_under_one_title(enter):
     assert client.node("/fit/head").opacity is None
     assert client.node("/fit/board").visible
     assert not client.node("/true/board").visible
-    assert client.node("/fit/board/title").text == "Face that fits / True face"
+    assert client.node("/fit/board/title0").text == "Face that fits / True face"
     assert np.abs(client.node("/fit").position).max() == 0
     gone = replace(overlaid().heads[1], opacity=0.0)
     shown.show(replace(overlaid(), heads=(overlaid().heads[0], gone)), False)
     assert not client.node("/true/head").visible
     shown.show(scene(), False)
     assert client.node("/true/head").opacity is None
-    assert client.node("/true/board/title").text == "True face"
+    assert client.node("/true/board/title0").text == "True face"
 
 
 def blinking(shown: Stage) -> dict[str, Any]:
@@ -250,18 +250,18 @@ def test_the_bar_is_true_and_in_the_picture_at_any_zoom(enter, zoom, size):
     )
     bar = client.node("/true/board/bar")
     assert np.ptp(bar.points[:, :, 0]) == pytest.approx(0.02, rel=1e-6)
-    assert client.node("/true/board/foot").text == "20\u202fmm"
+    assert client.node("/true/board/foot0").text == "20\u202fmm"
     middle = client.node("/true").position * (
         0,
         1,
         1,
     )  # zoomed in, the heads are partly beside the picture
-    for name in ("bar", "title", "foot"):
+    for name in ("bar", "title0", "foot0"):
         at = middle + client.node(f"/true/board/{name}").position
         assert np.abs(in_picture(client, at)).max() < 1, name
     shown.show(replace(scene(), scale_bar=0.0), False)
     assert not bar.visible
-    assert not client.node("/true/board/foot").visible
+    assert not client.node("/true/board/foot0").visible
 
 
 def test_zoom_and_rise_are_the_views(enter):
@@ -374,6 +374,21 @@ def test_through_the_camera_both_faces_keep_their_pixels(enter):
     shown.show(scene(through_camera=True), False)  # side by side: the fitted face alone
     assert not client.node("/true").visible
     assert client.node("/fit").visible
+    assert np.tan(client.camera.fov / 2) == pytest.approx(half, rel=1e-9)
+    # Its title is where the face is; no bar is true of all depths
+    away = client.node("/fit/board").position[2]
+    assert away == pytest.approx(-photo.fit_vertices[:, 2].mean(), rel=1e-6)
+    assert client.node("/fit/board/title0").text == "Face that fits"
+    assert not client.node("/fit/board/bar").visible
+    # Alone, it is zoomed to the photograph's eyes; over the true face it is not
+    wide = replace(photo, fit_eyes=1.02)
+    shown.show(replace(scene(through_camera=True), photo=wide), False)
+    assert np.tan(client.camera.fov / 2) == pytest.approx(1.02 * half, rel=1e-9)
+    shown.show(replace(overlaid(through_camera=True), photo=wide), False)
+    assert np.tan(client.camera.fov / 2) == pytest.approx(half, rel=1e-9)
+    shown.show(scene(), False)
+    assert client.node("/fit/board").position == pytest.approx((0, 0, 0))
+    assert client.node("/fit/board/bar").visible
 
 
 def test_colours_of_a_legend_are_sent_as_they_are_and_read_in_even_light(enter):
@@ -421,9 +436,37 @@ def test_a_draft_moves_the_coarse_mesh_and_rest_brings_both(enter):
 
 
 def test_words_below_a_narrow_row_give_way(enter):
-    for width, lines in ((1400, 3), (390, 1)):
+    for width, lines in ((1400, 3), (760, 4), (390, 1)):  # of 760 one is parted
         client, shown = enter(width, 800)
         shown.show(strip(), False)
-        assert len(client.node("/fit2/board/foot").text.split("\n")) == lines
-        assert stage.LINE_ROOM > 100
+        words = shown._heads["fit2"]._foot.lines
+        assert len(words) == lines
+        nodes = [client.node(f"/fit2/board/foot{k}") for k in range(lines)]
+        assert [node.text for node in nodes] == words
+        heights = [node.position[1] for node in nodes]
+        assert heights == sorted(heights, reverse=True)
+        assert all(abs(node.position[0]) < 1e-9 for node in nodes)  # each in the middle
         client.scene.reset()
+
+
+def test_words_give_way_when_panels_come_after_the_heads(enter):
+    client, shown = enter(1400, 800)
+    shown.show(strip(), False)
+    assert len(shown._heads["fit2"]._foot.lines) == 3
+    client.camera.image_width = 760
+    asyncio.run(client.camera.heard(client.camera))
+    assert len(shown._heads["fit2"]._foot.lines) == 4
+
+
+def test_words_of_neighbours_do_not_touch():
+    texts = ["Pin 1, assumed 30\u202fcm", "surface difference 2.8\u202fmm"]
+    for room in (60.0, 80.0, 140.0, 400.0, np.inf):
+        lines, scale = fitted(texts, room, 0.7)
+        assert " ".join(lines) == " ".join(texts)
+        assert 0.7 <= scale <= 1
+        assert not any(line.endswith("30") for line in lines)  # a number keeps its unit
+        if room > 80:  # the longest word and its unit have room
+            assert max(map(len, lines)) * scale * LETTER <= room - APART
+    assert fitted(texts, 400.0, 0.7) == (texts, 1.0)
+    assert len(fitted(texts[:1], 80.0, 0.7)[0]) == 2
+    assert fitted([""], 80.0, 0.7)[0] == []

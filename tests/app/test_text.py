@@ -181,6 +181,31 @@ def test_a_language_has_the_words_of_every_other(language):
             assert placeholders(said) == placeholders(FILE[section][name]), (section, name)
 
 
+# What no text of ours says of a face, or of a guess; in lessons alone an assumed distance may be wrong
+JUDGING = {
+    "en": r"distort|flatter|ugly|beautiful|your? real|real you|\bsimply\b|wrong (?!distance|one\b|camera|assumption)",
+    "de": r"verzerr|entstell|schmeichel|hässlich|schöne|dein wahres|wirkliches ich"
+    r"|falsche[snrm]? (?!Abstand|Kamera|Annahme|schlechter|steigt)",
+}
+
+
+@pytest.mark.parametrize("language", JUDGING)
+def test_no_text_judges_a_face_or_a_guess(language):
+    folder = ROOT / "assets"
+    said = (folder / "text" / f"{language}.toml").read_text(encoding="utf-8")
+    lessons_said = [
+        path.read_text(encoding="utf-8") for path in (folder / "lessons" / language).glob("*.md")
+    ]
+    assert len(lessons_said) == 5
+    for words_of in (said, *lessons_said):
+        flat = " ".join(words_of.split())
+        assert not re.findall(rf".{{20}}(?:{JUDGING[language]}).{{20}}", flat, re.IGNORECASE)
+    assert not re.search(r"\bwrong\b|\bfalsch", said, re.IGNORECASE)
+    assert "!" not in "".join(
+        said for names in tomllib.loads(said).values() for said in names.values()
+    )
+
+
 @pytest.mark.parametrize("language", OTHERS)
 def test_no_english_is_left_in_another_language(language):
     alike = {

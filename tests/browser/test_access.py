@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Literal
 
 import pytest
 
@@ -80,6 +81,7 @@ def test_on_every_tab_axe_finds_nothing_and_keys_reach_everything(desk, axe):
         assert len(wanted) > 2, tab  # of them two in the bar above
         assert all(wanted), f"{tab}: something has no name"
         assert not found_by_axe(desk), tab
+        assert not found_in_the_other_scheme(desk), tab
         assert sorted(walked(desk)) == sorted(wanted), tab
 
 
@@ -93,6 +95,23 @@ def test_on_a_phone_in_the_dark_axe_finds_nothing(phone, axe):
         unfold(phone)
         assert len(phone.tab.evaluate(CONTROLS)) > 2, tab
         assert not found_by_axe(phone), tab
+        assert not found_in_the_other_scheme(phone), tab
+
+
+def found_in_the_other_scheme(me: Visitor) -> list[str]:
+    """What axe finds of contrast, all that changes, in the dark for the light and the other way round."""
+    scheme = "() => document.documentElement.dataset.mantineColorScheme"
+    dark = me.tab.evaluate(scheme) == "dark"
+
+    def turn(now: Literal["light", "dark"]) -> None:
+        me.tab.emulate_media(color_scheme=now)
+        me.until(lambda: me.tab.evaluate(scheme) == now, f"the page does not turn {now}")
+
+    turn("light" if dark else "dark")
+    me.tab.wait_for_timeout(200)  # colours of buttons fade
+    found = found_by_axe(me, "color-contrast")
+    turn("dark" if dark else "light")
+    return found
 
 
 def walked(me: Visitor) -> list[str]:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import io
+
 import numpy as np
 import pytest
+from PIL import Image
 
 from faceambig_app.link import query
 from faceambig_app.state import DEFAULT, changed
@@ -20,6 +23,7 @@ AT = """([name, k]) => { const c = __viserMutable.camera; let mesh;
   const p = mesh.geometry.attributes.position, box = __viserMutable.canvas.getBoundingClientRect();
   const v = c.position.clone().set(p.getX(k), p.getY(k), p.getZ(k)).applyMatrix4(mesh.matrixWorld).project(c);
   return [box.left + (v.x + 1) / 2 * box.width, box.top + (1 - v.y) / 2 * box.height] }"""
+HIDE = ".mantine-Notifications-root { display: none }"
 OPACITIES = """() => Object.fromEntries(["true", "fit"].map(name => { let found;
   __viserMutable.nodeRefFromName[`/${name}/head`]?.traverse(o => { if (!found && o.isMesh) found = o });
   return [name, found && [found.material.transparent, +found.material.opacity.toFixed(3)]] }))"""
@@ -71,9 +75,8 @@ def test_a_pin_is_named_by_typing_and_its_name_is_in_row_table_and_link(me, visi
     heads = me.tab.locator("table:has(caption) thead th")
     assert heads.all_inner_texts() == ["Pin 1", "N\u00e4her <b> \u05e9"]
     me.goes(show="row")
-    assert (
-        me.browser.stage._heads["pin2"]._title.text == "N\u00e4her <b> \u05e9, assumed 50\u202fcm"
-    )
+    title = me.browser.stage._heads["pin2"]._title.lines
+    assert " ".join(title) == "N\u00e4her <b> \u05e9, assumed 50\u202fcm"
     me.tab.screenshot(path=str(artefacts(tmp_path) / "pins_named.png"))
     link = query(me.state)
     you = visit(query=link)
@@ -93,6 +96,34 @@ def test_one_head_of_an_overlay_is_solid_at_every_fade(me):
                             (0.9, [False, 1], [True, 0.4])):  # fmt: skip
         me.goes(show="overlay", fade=fade)
         assert me.tab.evaluate(OPACITIES) == {"true": true, "fit": fit}, fade
+
+
+# ---------------------------------------------------------------- the legend
+
+
+# Where all vertices are in the window, pixels, and how much they face the viewer of a front view
+PLACES = """name => { const c = __viserMutable.camera; let mesh;
+  __viserMutable.nodeRefFromName[name].traverse(o => { if (!mesh && o.isMesh) mesh = o });
+  const { position: p, normal: n } = mesh.geometry.attributes, box = __viserMutable.canvas.getBoundingClientRect();
+  return Array.from({ length: p.count }, (_, k) => {
+    const v = c.position.clone().set(p.getX(k), p.getY(k), p.getZ(k)).applyMatrix4(mesh.matrixWorld).project(c);
+    return [box.left + (v.x + 1) / 2 * box.width, box.top + (1 - v.y) / 2 * box.height, n.getZ(k)] }) }"""
+
+
+def colours_are_the_legends(me: Visitor) -> None:
+    """Of what faces the viewer: pixels as the legend has them, so that a value read by eye is right."""
+    nodes = me.browser.stage._heads["fit"]
+    values, colours = nodes._values, np.asarray(nodes._painted, dtype=int)
+    assert values is not None
+    at = np.array(me.tab.evaluate(PLACES, "/fit/head"))
+    front = (at[:, 2] > 0.9) & (nodes._full.vertices[:, 2] > 0.02) & np.isfinite(values)
+    png = Image.open(io.BytesIO(me.tab.screenshot(style=HIDE))).convert("RGB")
+    x, y = np.round(at[front, :2]).astype(int).T
+    pixels = np.asarray(png).astype(int)[y, x]
+    # 6 of 255 measured: shine, the lamps' tint; 13 with lamps twice as strong
+    assert np.median(np.abs(pixels - colours[front]).max(axis=1)) <= 8
+    scale = values[front][np.argmin(np.abs(pixels[:, None] - colours[front]).sum(axis=2), axis=1)]
+    assert np.median(np.abs(scale - values[front])) < 0.3  # mm of 15
 
 
 # ---------------------------------------------------------------- millimetres under the pointer
@@ -135,6 +166,7 @@ def test_the_skin_is_not_asked_and_a_press_that_turns_the_heads_is_no_click(me):
 def test_a_finger_reads_by_a_tap(visit, tmp_path):
     you = visit(390, 844, query="show=difference&view=front", dpr=1, has_touch=True)
     you.close_notices()
+    colours_are_the_legends(you)
     vertex, mm = vertex_of(you, "fit")
     x, y = you.tab.evaluate(AT, ["/fit/head", vertex])
     you.tab.touchscreen.tap(x, y)

@@ -102,3 +102,18 @@ def test_a_head_that_is_taken_out_and_put_back_is_seen_as_a_blank_frame(me):
     seen = drag(me, take_out)
     assert blank(seen) != []
     assert len(seen) - 1 not in blank(seen)  # the next value has put it back
+
+
+def test_no_frame_is_blank_while_two_heads_blink(me):
+    """Both stand in the middle, so what is in the two halves is one head."""
+    me.goes(show="blink")
+    me.tab.evaluate(WATCH)
+    me.tab.wait_for_function(
+        "() => faceambigWatched.length > 8 && new Set(faceambigWatched.map(frame => frame[3])).size > 1"
+    )
+    seen = np.array(me.tab.evaluate(WATCHED))
+    sizes = seen[:, 0] + seen[:, 1]
+    assert sizes.max() > 1000
+    assert sizes.min() > SHARE * sizes.max()
+    me.tab.keyboard.press("Escape")
+    me.until(lambda: me.state.show == "both", "Escape does not stop it")

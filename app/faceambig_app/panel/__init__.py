@@ -73,18 +73,22 @@ class Panel:
 
         if narrow:  # one panel: the photograph comes first, beside the numbers
             self.classroom = build_class()
+            # and the slider, before anything is scrolled
             photo = self._photo(w, lessons_do, narrow)
         else:
             side = gui.add_panel()
             with side.add_tab(say("panel.photo")):
                 self.classroom = build_class()
                 photo = self._photo(w, lessons_do, narrow)
+                self.lesson.build_list()
             side.dock_left()
             side.set_width(width)
         tabs = gui.add_tab_group()
         with tabs.add_tab(say("panel.explore")):
             explore.build_first(w)
             cards, legend, plots = gui.add_html(""), gui.add_html(""), gui.add_html("")
+            if narrow:
+                self.lesson.build_list()
             explore.build_photo(w, people)
             self.flex = flex.Flex(w, self.lesson.flex)
             explore.build_data(w)
@@ -107,9 +111,7 @@ class Panel:
         """The places of the heading, the photograph, its crosses and its circles; the lesson between them."""
         heading = w.gui.add_html("")
         self.lesson = lessons.Lessons(w, lessons_do, narrow=narrow)
-        photo = w.gui.add_html(""), w.gui.add_html(""), w.gui.add_html("")
-        self.lesson.build_list()
-        return heading, *photo
+        return heading, w.gui.add_html(""), w.gui.add_html(""), w.gui.add_html("")
 
     def show(self, state: ViewState) -> None:
         """Write a state into the widgets; on the event loop only, so an older value never overwrites a newer one."""

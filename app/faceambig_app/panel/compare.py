@@ -21,7 +21,8 @@ def build(w: Widgets) -> viser.GuiHtmlHandle:
     table = w.gui.add_html("")
     for number in range(PINS):
         _build_pin(w, number)
-    w.action("unpin")
+    remove = w.action("unpin")
+    w.watch(lambda state: bool(state.pins), lambda some: setattr(remove, "visible", some))
     return table
 
 
