@@ -2,8 +2,8 @@
 
 The server runs in a process of its own. Each browser is a websocket that moves sliders, presses buttons, changes the
 person and the look, saves numbers, says nonsense, leaves, vanishes and comes back. Every few seconds memory,
-descriptors, threads, asyncio tasks, rooms and objects are counted in the server; meanwhile one more browser moves its
-distance and waits for the heads. Memory alone is noise: what counts are slopes, each by least squares over the time
+descriptors, threads, asyncio tasks, rooms and blocks of Python's memory are counted in the server; meanwhile one more
+browser moves its distance and waits for the heads. Memory alone is noise: what counts are slopes, each by least squares over the time
 after the first fifth, with the slope's own error.
 
     --clients 20 --minutes 60 --pause 4 (mean seconds between two things that one browser does) --seed 1 --json FILE
@@ -38,7 +38,7 @@ from wire import GONE, Wire
 EVERY = 5.0  # seconds between two samples
 SETTLED = 0.2  # of the time: until then caches fill
 PATIENCE = 60.0  # seconds until an answer counts as none
-COUNTED = ("rss_mb", "descriptors", "threads", "tasks", "rooms", "objects", "answer_ms")
+COUNTED = ("rss_mb", "descriptors", "threads", "tasks", "rooms", "blocks", "answer_ms")
 # Left alone: hidden from view, made of a person's own photograph, or a minute's work of one line for all
 LEFT_OUT = ("Save it as", "Save the picture", "Find the points", "What moves")
 
@@ -68,7 +68,7 @@ def counted(page: Any) -> dict[str, float]:
         "threads": threading.active_count(),
         "tasks": len(asyncio.all_tasks(loop)),
         "rooms": len(page._browsers),
-        "objects": len(gc.get_objects()),
+        "blocks": sys.getallocatedblocks(),
     }
 
 

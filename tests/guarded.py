@@ -187,6 +187,7 @@ def made(gui: viser.GuiApi) -> dict[str, Any]:
         "upload": gui.add_upload_button("Photo"),
         "off": gui.add_slider("Disabled", 0, 9, 1, 5, disabled=True),
         "gone": gui.add_slider("Hidden", 0, 9, 1, 5, visible=False),
+        "done": gui.add_progress_bar(30.0),
     }
 
 

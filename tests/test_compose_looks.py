@@ -11,6 +11,7 @@ import faceambig as fa
 import scenes
 from faceambig import compose as fc
 from faceambig.arrays import vertex_normals
+from faceambig.boundary import occluding_boundary
 from faceambig.camera import Camera, depths, project
 from faceambig.compose.face import centre_of
 from faceambig.compose.overlays import BREAK, FARTHEST, LIFT, apex, station
@@ -336,7 +337,7 @@ def test_a_pyramid_has_the_photographs_corners_and_stands_where_the_camera_does(
 def test_the_outline_is_the_visible_boundary_of_the_fitted_face():
     outline = composed(overlays=("outline",)).photo.outline
     assert outline is not None
-    boundary = fa.boundary.occluding_boundary(MODEL, FACE.own_vertices, FIT.camera)
+    boundary = occluding_boundary(MODEL, FACE.own_vertices, FIT.camera)
     seen = set(boundary.vertices[boundary.visible].tolist())
     edges = [e for e in boundary.edges.tolist() if set(e) <= seen]
     xy = project(FIT.camera, FACE.own_vertices) + OBSERVATION.centre
@@ -473,6 +474,8 @@ def test_a_density_is_told_at_the_distances_of_the_curves():
     (low50, high50), (low95, high95) = told.intervals
     assert low95 < low50 < 0.8 < high50 < 3.2
     assert high95 == np.inf  # 2.5 % are less than lie beyond
+    far = fc.with_density(plot, DistanceDensity(at, 0.2 * shape / whole, 0.8))
+    assert far.intervals[0] == (pytest.approx(3.2), np.inf)  # even 25 % lie beyond
 
 
 def test_pinned_faces_stand_on_one_scale_each_against_its_own_truth():

@@ -259,6 +259,7 @@ class Browser:
         """Make all that has words, or make it anew: most controls cannot change theirs. What is shown stays."""
         self.language, again = language(), self._built
         self._lessons.read(lessons(self.language))
+        self._built = False
         if again:
             guard.clear(self._client.gui, keep=self.script.elements)
         self._build()
@@ -398,7 +399,7 @@ class Browser:
             try:
                 rest = display.draw(state, draft, self._own.photo)
             except Exception:
-                if display is self._display and spoken == self.language:
+                if self._built and display is self._display and spoken == self.language:
                     raise
                 return  # it drew for a panel that is no more; for the new one it is asked again
             if rest is not None:

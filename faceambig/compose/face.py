@@ -169,7 +169,7 @@ def with_density(plot: Curves, density: DistanceDensity) -> Curves:
     )
     highest = float(at.max())
     ends = density.quantiles([0.5 + sign * 0.5 * level for level in LEVELS for sign in (-1, 1)])
-    low, high = ends[::2].tolist(), ends[1::2].tolist()
+    low, high = ends[::2].clip(max=density.distances[-1]).tolist(), ends[1::2].tolist()
     return replace(
         plot,
         density=at / highest if highest > 0 else at,

@@ -381,6 +381,7 @@ OF_NO_KIND = (
     ("show", "none"), ("size", [1, 2]), ("size", [1, 2, math.nan]), ("size", [1, 2, 99]), ("size", "abc"), ("size", 3),
     ("tint", [0, 0, 256]), ("tint", [0.5, 0, 0]), ("tint", [-1, 0, 0]), ("range", [0.8, 0.2]), ("range", [0.5]),
     ("range", [0.1, 1.2]), ("upload", "x"), ("upload", {"name": "x", "content": b""}), ("off", 7), ("gone", 7),
+    ("done", 50.0), ("done", math.nan),
 )  # fmt: skip
 
 
@@ -410,7 +411,9 @@ def test_values_of_no_kind_are_put_back(tiny: Tiny) -> None:
             if name not in ("upload", "show"):  # these show no value
                 right = list(value) if isinstance(value, tuple) else value
                 assert browser.shows(controls[name]) == right, name
-        said = len(OF_NO_KIND) - 2  # of a disabled or hidden one nothing is said
+        said = (
+            len(OF_NO_KIND) - 4
+        )  # of a disabled or hidden one, and of one that only shows, nothing is said
         assert len(tiny.refused) == said
     assert not tiny.errors
 

@@ -36,7 +36,11 @@ async def update(api: Any, client_id: Any, message: Any) -> None:
     _typed.discard(message.uuid)
     if before is not None:
         before.timer.cancel()
-    if message.updates.keys() != {"value"} or control.disabled or not control.visible:
+    if (
+        message.updates.keys() != {"value"}
+        or getattr(control, "disabled", True)
+        or not control.visible
+    ):
         _put_back(api, client_id, control)
         return
     asked = message.updates["value"]
