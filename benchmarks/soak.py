@@ -3,8 +3,8 @@
 The server runs in a process of its own. Each browser is a websocket that moves sliders, presses buttons, changes the
 person and the look, saves numbers, says nonsense, leaves, vanishes and comes back. Every few seconds memory,
 descriptors, threads, asyncio tasks, rooms and blocks of Python's memory are counted in the server; meanwhile one more
-browser moves its distance and waits for the heads. Memory alone is noise: what counts are slopes, each by least squares over the time
-after the first fifth, with the slope's own error.
+browser moves its distance and waits for the heads. Memory alone is noise: what counts are slopes, each by least squares
+over the time after the first fifth, with the slope's own error.
 
     --clients 20 --minutes 60 --pause 4 (mean seconds between two things that one browser does) --seed 1 --json FILE
 """
