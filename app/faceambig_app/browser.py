@@ -6,6 +6,7 @@ What a person does arrives on the event loop as a change of the state; what is c
 from __future__ import annotations
 
 import logging
+import threading
 import time
 from asyncio import AbstractEventLoop, TimerHandle
 from dataclasses import replace
@@ -111,6 +112,7 @@ class Browser:
         self._invitation = invitation
         self._first: TimerHandle | None = None  # opens the page where no script says a word
         self._built = False  # whether there is a panel
+        self._one = threading.Lock()  # who writes into the panel, or makes another
 
     def _build(self) -> None:
         """The panel and the commands, in the language that is spoken."""
@@ -128,7 +130,7 @@ class Browser:
         # A worker may still be drawing for a panel that has been made anew
         self._display = Display(
             self._client, self.stage, panel,
-            gone=lambda: self.room.left or self.panel is not panel,
+            gone=lambda: self.room.left or self.panel is not panel, one=self._one,
         )  # fmt: skip
         boxes = figures.hidden_boxes(panel.widgets.step_sliders)
         panel.places.style.content = STYLE + boxes + (bold(width) if leads else "")
@@ -143,9 +145,7 @@ class Browser:
     def open(self) -> None:
         """Make the panel. The first frame is of the state in the address, or of the default where no script tells."""
         with speaking(self._language_of(self.room.state)):
-            with self._client.atomic():  # else each control wakes the loop, which is here
-                self._translate()
-            self._client.flush()
+            self._translate()
             self._first = self._loop.call_later(HELLO, self._unheard)
 
     def _unheard(self) -> None:
@@ -259,10 +259,12 @@ class Browser:
         """Make all that has words, or make it anew: most controls cannot change theirs. What is shown stays."""
         self.language, again = language(), self._built
         self._lessons.read(lessons(self.language))
-        self._built = False
-        if again:
-            guard.clear(self._client.gui, keep=self.script.elements)
-        self._build()
+        with self._one, self._client.atomic():  # else each control wakes the loop, which is here
+            self._built = False
+            if again:
+                guard.clear(self._client.gui, keep=self.script.elements)
+            self._build()
+        self._client.flush()
         self.script.words(words()["page"])
         self.script.language(self.language, words()["icon"])
         if again:

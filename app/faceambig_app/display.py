@@ -5,6 +5,7 @@ Scenes become nodes (stage), words and plots the contents of the panel's element
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -43,12 +44,23 @@ class Sent(NamedTuple):
 
 
 class Display:
-    """The elements and nodes of one browser. `gone` says whether the browser has left meanwhile."""
+    """The elements and nodes of one browser. `gone` says whether the browser has left meanwhile, or has another panel.
+
+    one: held while something is written, and by who takes the panel away: an element that is removed at that moment
+    would be written into all the same, in a browser that has it no more.
+    """
 
     def __init__(
-        self, client: viser.ClientHandle, stage: Stage, panel: Panel, *, gone: Callable[[], bool]
+        self,
+        client: viser.ClientHandle,
+        stage: Stage,
+        panel: Panel,
+        *,
+        gone: Callable[[], bool],
+        one: threading.Lock,
     ) -> None:
         self._client, self._stage, self._panel, self._gone = client, stage, panel, gone
+        self._one = one
         self._rested: ViewState | None = None  # the state drawn in full last
         self._sent = Sent()
 
@@ -92,9 +104,9 @@ class Display:
         return [(at.flex, shown.flex), (at.spectrum, shown.spectrum), (at.pins, shown.pins)]
 
     def _send(self, html: Contents, scene: Scene | None = None, draft: bool = False) -> None:
-        if self._gone():  # while this was computed
-            return
-        with self._client.atomic():
+        with self._one, self._client.atomic():
+            if self._gone():  # while this was computed
+                return
             if scene is not None:
                 self._stage.show(scene, draft)
             for handle, content in html:

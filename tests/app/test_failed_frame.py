@@ -41,3 +41,49 @@ def test_controls_are_said_again_after_a_frame_that_failed(monkeypatch):
         asyncio.run(visit())
     finally:
         page.close()
+
+
+def test_a_panel_that_is_made_anew_under_a_moving_hand_is_not_written_into(monkeypatch, caplog):
+    monkeypatch.syspath_prepend(str(FOLDER))
+    wires = importlib.import_module("wire")
+    monkeypatch.delitem(sys.modules, "wire")
+    there: set[str] = set()
+    lost: list[dict[str, Any]] = []
+
+    class Listening(wires.Wire):
+        """Knows which elements there are, as the page does."""
+
+        def _hear(self, message: dict[str, Any]) -> None:
+            kind, uuid = message["type"], message.get("uuid")
+            if kind == "GuiRemoveMessage":
+                there.discard(uuid)
+            elif kind == "GuiUpdateMessage":
+                if uuid not in there:
+                    lost.append(message)
+            elif kind.startswith("Gui") and uuid is not None:
+                there.add(uuid)
+            super()._hear(message)
+
+    page = server.Page("127.0.0.1", 0)
+    try:
+        wire = Listening(int(page.address.rsplit(":", 1)[1].strip("/")))
+        assert wire.rests(60)
+        spoken = {
+            "Deutsch": ("Language", "Assumed distance"), "English": ("Sprache", "Angenommener Abstand"),
+        }  # fmt: skip
+        for k, (wanted, (group, slider)) in enumerate(6 * list(spoken.items())):
+            assert wire.wait(lambda g=group: labelled(wire, g), 60)
+            wire.set(wire.control("Slider", slider), 10 + k)
+            wire.read(0.002 * k)
+            wire.set(wire.control("ButtonGroup", group), wanted)
+        assert wire.wait(lambda: labelled(wire, "Language"), 60)
+        wire.close()
+    finally:
+        page.close()
+    assert not lost
+    assert not caplog.records
+
+
+def labelled(wire: Any, label: str) -> bool:
+    """Whether there is a control of this label."""
+    return any(made["props"].get("label") == label for made in wire.controls.values())
