@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shlex
 import subprocess
@@ -423,6 +424,7 @@ def test_serve_is_given_host_and_port(capsys, monkeypatch):
 
     asked: list[tuple[str, int]] = []
     monkeypatch.setattr(faceambig_app.server, "serve", lambda *place, **_: asked.append(place) or 0)
+    monkeypatch.setattr(os, "_exit", sys.exit)  # the end of a whole process, which this one is not
     assert printed(capsys, "serve", "--port", 0)[0] == 0
     assert printed(capsys, "serve", "--host", "::1")[0] == 0
     assert asked == [("127.0.0.1", 0), ("::1", 8080)]
