@@ -56,7 +56,7 @@ def step_html(
         if said is None and held is not None:
             parts.append(f'<p class="fa-said">{escape(say("class.held", words=held))}</p>')
         if said is None:
-            return _wrapped(parts)
+            return _wrapped(parts, f"{lesson.number}.{number}")
         if said:
             parts.append(f'<p class="fa-said">{escape(say("lesson.said", words=said))}</p>')
         parts.append(html_of(step.answered))
@@ -64,11 +64,11 @@ def step_html(
         parts.append(_tasks(step, ticked))
         if len(ticked) == len(step.tasks):
             parts.append(html_of(step.done))
-    return _wrapped(parts)
+    return _wrapped(parts, f"{lesson.number}.{number}")
 
 
-def _wrapped(parts: list[str]) -> str:
-    return f'<div class="fa fa-lesson">{"".join(parts)}</div>'
+def _wrapped(parts: list[str], place: str) -> str:
+    return f'<div class="fa fa-lesson" data-fa-step="{place}">{"".join(parts)}</div>'
 
 
 def _tasks(step: Step, ticked: Collection[int]) -> str:

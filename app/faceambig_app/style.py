@@ -50,7 +50,7 @@ font-variant-numeric:tabular-nums;line-height:1.15;display:block}
 _LESSON = """
 .fa-steps{display:flex;gap:6px;margin-top:.6em}
 .fa-steps i{flex:1;height:5px;border-radius:3px;background:var(--fa-line)}
-.fa-steps .fa-on{background:var(--fa-dl)}.fa-lesson{overflow-wrap:anywhere;padding-right:1.25em}
+.fa-steps .fa-on{background:var(--fa-dl)}.fa-lesson{overflow-wrap:anywhere;padding-right:1.25em;scroll-margin-top:.5em}
 .fa-lesson ul,.fa-lesson ol{margin:.3em 0;padding-left:1.4em}
 .fa-said{border-left:4px solid var(--fa-dl);padding-left:8px}
 .fa .fa-tasks{list-style:none;padding:0}.fa-tasks li{display:grid;grid-template-columns:1.6em 1fr;margin:.25em 0}

@@ -21,6 +21,7 @@
 // In what a panel shows:
 //   data-fa-copy="TEXT"                   a click, Enter or Space copies the text
 //   data-fa-host                          an element in which the page's own host and port are written
+//   data-fa-step                          lesson and step: brought into view when it changes
 //   data-fa-spoken                        its text is said to a screen reader, SILENCE after it changed last
 //   data-fa-photo="WIDTHxHEIGHT"          an element whose box shows a photograph of so many pixels
 //   data-fa-view="X,Y,WIDTH,HEIGHT"       on it: the part in the box, in pixels of the photograph; else all of it

@@ -17,6 +17,19 @@ function keepUnfolded() {
   }
 }
 
+// A step of a lesson that begins is brought into view: on a phone it was chosen, or the one before left, far below it.
+let step = null; // lesson and step that were there last
+
+function showStep() {
+  const text = document.querySelector("[data-fa-step]");
+  const now = text?.dataset.faStep ?? null;
+  if (now === step) return;
+  step = now;
+  if (!text) return;
+  const { top, height } = text.getBoundingClientRect();
+  if (top < 0 || top + Math.min(height, 100) > innerHeight) text.scrollIntoView({ block: "start" });
+}
+
 document.addEventListener(
   "toggle", // it does not bubble
   ({ target }) => {

@@ -81,6 +81,7 @@ new MutationObserver(() => {
   nameCopies();
   readPhoto();
   keepUnfolded();
+  showStep();
   nameHost();
   speak();
 }).observe(document, { childList: true, subtree: true });

@@ -61,6 +61,6 @@ def test_the_panel_is_there_before_the_script_says_a_word(monkeypatch, page, ask
         }  # fmt: skip
         visitor.set(one.script._control, json.dumps({"hello": hello}))
         assert until(lambda: one.room.state.distance == 0.5, SOON)
-        assert until(lambda: one._settled is not None, SOON)
+        assert until(lambda: one._pointer.settled is not None, SOON)
         assert len(labels(visitor)) == made
     assert until(lambda: not page._browsers, SOON)
