@@ -18,7 +18,7 @@ from .state import DEFAULT, ViewState, for_eyes_of
 from .text import language
 from .told import Slider, flex_lines, pins_of, sliders_of, spectrum_of, told
 
-KEPT = 12  # states; each holds its heads, some megabytes
+KEPT = 48  # states, each with its heads of about a megabyte: more than one slider passes at a time
 
 _T = TypeVar("_T")
 
