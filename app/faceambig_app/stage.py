@@ -168,9 +168,9 @@ class Stage:
         self._blink.content = data_html("blink", {"nodes": nodes, "seconds": BLINK_SECONDS})
 
     def _place(self, sight: Sight) -> None:
-        """Stand everything as it is now seen; inside client.atomic(), which is one thread's at a time."""
+        """Stand everything as it is now seen, in client.atomic(): the viewer has turned, perhaps while a worker draws."""
         self._stand(sight)
-        for nodes in self._points.values():
+        for nodes in list(self._points.values()):
             nodes.turn(sight)
 
     def _stand(self, sight: Sight) -> None:
@@ -178,7 +178,7 @@ class Stage:
         if sight is not self._sight:
             self._sight, self._wxyz = sight, quaternion(sight.board)
             self._lights.wxyz = self._wxyz
-        for nodes in self._heads.values():
+        for nodes in list(self._heads.values()):
             nodes.place(sight, self._wxyz)
 
     def _light_room(self) -> None:

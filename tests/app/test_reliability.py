@@ -185,6 +185,7 @@ def test_numbers_that_are_none_are_refused_before_they_are_sent(monkeypatch, com
         stage(self, scene, draft)
 
     monkeypatch.setattr(Stage, "show", look)
+    monkeypatch.setattr(drawn, "_KEPT", drawn.Kept())  # of what was drawn before
     monkeypatch.setattr(drawn, "frame", nan_once)
     drag(wire, 30)
     assert wire.wait(lambda: wire.notices, SOON)

@@ -6,6 +6,8 @@ import asyncio
 import contextlib
 import json
 import re
+import threading
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from html import unescape
@@ -456,6 +458,37 @@ def test_words_give_way_when_panels_come_after_the_heads(enter):
     client.camera.image_width = 760
     asyncio.run(client.camera.heard(client.camera))
     assert len(shown._heads["fit2"]._foot.lines) == 4
+
+
+def test_who_turns_while_words_are_written_writes_none_twice(enter, monkeypatch):
+    # a worker draws, and the page's place comes on the loop: two labels of one name remove each other
+    client, shown = enter()
+    made: list[str] = []
+    real = client.scene.add_label
+
+    def slow(name: str, *given: Any, **options: Any) -> Any:
+        made.append(name)
+        time.sleep(0.05)
+        return real(name, *given, **options)
+
+    monkeypatch.setattr(client.scene, "add_label", slow)
+    errors: list[BaseException] = []
+
+    def turn() -> None:
+        try:
+            while not made:
+                time.sleep(0.001)
+            sight = shown._viewer.sight
+            shown._place(replace(sight, pixel=1.1 * sight.pixel))
+        except BaseException as error:  # noqa: BLE001 - whatever it is
+            errors.append(error)
+
+    thread = threading.Thread(target=turn)
+    thread.start()
+    shown.show(strip(), False)
+    thread.join(10)
+    assert not errors
+    assert len(made) == len(set(made)) > 1
 
 
 def test_words_of_neighbours_do_not_touch():
