@@ -168,7 +168,7 @@ class Stage:
         self._blink.content = data_html("blink", {"nodes": nodes, "seconds": BLINK_SECONDS})
 
     def _place(self, sight: Sight) -> None:
-        """Stand everything as it is now seen, in client.atomic(): the viewer has turned, perhaps while a worker draws."""
+        """Stand everything as it is now seen; inside client.atomic(), perhaps while a worker draws."""
         self._stand(sight)
         for nodes in list(self._points.values()):
             nodes.turn(sight)
