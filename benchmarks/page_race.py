@@ -15,7 +15,7 @@ import numpy as np
 from page_load import PATIENCE, QUIET
 from page_tab import Tab, opened
 
-CONTROLS = ("Assumed distance", "Photo taken from", "Turn")  # of the fit, and of the photograph
+CONTROLS = ("Assumed distance", "Photo taken from", "Turn (°)")  # of the fit, and of the photograph
 PAIRS = 4  # tabs that race at the same time
 
 
