@@ -28,10 +28,20 @@ APP = "faceambig_app"
 # Stage -> functions that do it; "*" for all of a module. What one calls of another stage is the other's.
 STAGES = {
     "hear": ("guard.messages._checked", "browser.Browser.change"),
-    "fit": ("fits._fit", "fits._of_outline", "fits.photograph"),
-    "compose": ("scenes.scene_of",),
-    "sweep, posterior": ("faces._curve", "likely.posterior", "likely.bending"),
-    "figures": ("figures.*", "photograph.*", "plots.*", "told.*", "scenes.photo_jpeg"),
+    "fit": ("pipeline.fits._fit", "pipeline.fits._of_outline", "pipeline.fits.photograph"),
+    "compose": ("pipeline.scenes.scene_of",),
+    "sweep, posterior": (
+        "pipeline.faces._curve",
+        "pipeline.likely.posterior",
+        "pipeline.likely.bending",
+    ),
+    "figures": (
+        "markup.figures.*",
+        "markup.photograph.*",
+        "markup.plots.*",
+        "pipeline.told.*",
+        "pipeline.scenes.photo_jpeg",
+    ),
     "stage": ("stage.Stage.show",),
 }
 

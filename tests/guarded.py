@@ -19,7 +19,7 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
 from faceambig_app import guard
-from faceambig_app.guard import door
+from faceambig_app.guard import log
 
 SOON = 5.0  # seconds: other tests share the processors
 CAMERA = {
@@ -138,7 +138,7 @@ class Tiny:
         return len(self.server._websock_server._live_connections)
 
     def forget(self) -> None:
-        door.LINES.clear()
+        log.LINES.clear()
         for told in (self.refused, self.errors, self.files):
             told.clear()
 

@@ -30,12 +30,12 @@ from faceambig.io.landmarks import parse_landmarks
 from faceambig.io.pictures import picture_size
 from faceambig.io.schemes import load_scheme
 from faceambig_app import own
-from faceambig_app.forms import to_json
 from faceambig_app.guard.messages import FIELDS, _checked
-from faceambig_app.link import query
 from faceambig_app.notices import from_file, from_query
 from faceambig_app.script import read_report
 from faceambig_app.state import DEFAULT, ViewState
+from faceambig_app.state.forms import to_json
+from faceambig_app.state.link import query
 from states import states
 from strategies import face_of, tiny_model
 

@@ -62,6 +62,6 @@ def test_command_line_starts_without_loading_anything_heavy() -> None:
 
 
 def test_state_link_and_history_do_without_numpy_and_viser() -> None:
-    modules = ("state", "forms", "link", "history")
+    modules = ("state", "state.forms", "state.link", "state.history", "state.actions")
     statement = "import " + ", ".join(f"faceambig_app.{name}" for name in modules)
     assert not loaded_by(statement) & (HEAVY | {"faceambig"})

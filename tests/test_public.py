@@ -151,7 +151,7 @@ def test_page_and_snapshot_are_importable_by_their_names():
     assert sorted(faceambig_app.__all__) == faceambig_app.__all__
     assert {"ViewState", "snapshot"} <= set(faceambig_app.__all__)
     from faceambig_app import ViewState, snapshot
-    from faceambig_app.pipeline import snapshot as same
+    from faceambig_app.export import snapshot as same
 
     assert snapshot is same
     assert ViewState(subject=3, actual=0.3, distance=1.2).subject == 3

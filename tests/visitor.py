@@ -14,9 +14,9 @@ import pytest
 from playwright.sync_api import Page as Tab
 
 from faceambig_app import server
-from faceambig_app.history import History
-from faceambig_app.link import query
 from faceambig_app.state import DEFAULT, ViewState, changed
+from faceambig_app.state.history import History
+from faceambig_app.state.link import query
 
 PATIENCE = 90_000  # milliseconds until something is seen: other tests share the processors
 # Every 37th vertex: enough to see a change, and little to send

@@ -17,7 +17,7 @@ from typing import Any
 import cv2
 
 from faceambig.experiments import NAMES, experiment
-from faceambig_app.report import VERDICTS
+from faceambig_app.reports.report import VERDICTS
 from faceambig_app.text import say
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"

@@ -18,10 +18,9 @@ from pathlib import Path
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(variable, "1")
 
-from faceambig_app import measures
-from faceambig_app.fields import LANGUAGES
-from faceambig_app.lesson_page import teacher_page
-from faceambig_app.lessons import NUMBERS, expressions, read_lessons
+from faceambig_app.lessons import NUMBERS, expressions, measures, read_lessons
+from faceambig_app.lessons.page import teacher_page
+from faceambig_app.state.fields import LANGUAGES
 from faceambig_app.text import speaking
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from .state import ViewState
 
 if TYPE_CHECKING:
-    from .pipeline import snapshot
+    from .export import snapshot
 
 __all__ = ["ViewState", "snapshot"]
 
@@ -15,7 +15,7 @@ __all__ = ["ViewState", "snapshot"]
 def __getattr__(name: str) -> Any:
     # `snapshot` pulls in NumPy, OpenCV and the renderer; a state alone must not
     if name == "snapshot":
-        from .pipeline import snapshot
+        from .export import snapshot
 
         return snapshot
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -14,23 +14,22 @@ from typing import cast
 
 import viser
 
-from . import figures, guard, history, own_page
-from .actions import ACTIONS
+from . import guard
 from .classroom import Classroom, Seat
 from .display import Display, Rest
-from .fields import FIELDS
-from .fits import model
-from .forms import command
 from .glide import Glide
-from .lesson_room import LessonRoom
 from .lessons import lessons
-from .link import query
+from .lessons.room import LessonRoom
+from .markup import figures
+from .markup.style import STYLE, bold
 from .notices import cause, from_query
 from .orders import Orders
-from .own_room import OwnRoom
+from .own import page as own_page
+from .own.room import OwnRoom
 from .panel import SIDE_WIDTH, Change, Panel, palette
 from .panel.classroom import Shown
 from .panel.widgets import setting
+from .pipeline.fits import model
 from .room import REST, Dispatcher, Room
 from .saving import Saving
 from .script import (
@@ -49,8 +48,11 @@ from .script import (
     is_dark,
 )
 from .stage import Stage
-from .state import DEFAULT, ViewState, changed
-from .style import STYLE, bold
+from .state import DEFAULT, ViewState, changed, history
+from .state.actions import ACTIONS
+from .state.fields import FIELDS
+from .state.forms import command
+from .state.link import query
 from .text import AUTO, accepted, language, say, speaking, words
 from .under import Pointer
 

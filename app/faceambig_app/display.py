@@ -13,16 +13,17 @@ import viser
 
 from faceambig.scene import Numbers, Scene
 
-from . import figures, own_page, photograph
 from .drawn import Drawn, drawn
-from .faces import curve_key
+from .markup import figures, photograph
+from .markup.style import text_size
 from .own import OwnFrame, OwnPhoto, own_frame, told_distance
+from .own import page as own_page
 from .panel import Panel
-from .scenes import photo_jpeg, whole
+from .pipeline.faces import curve_key
+from .pipeline.scenes import photo_jpeg, whole
+from .pipeline.told import Slider
 from .stage import Stage
 from .state import ViewState
-from .style import text_size
-from .told import Slider
 
 Contents = list[tuple[viser.GuiHtmlHandle, str]]
 

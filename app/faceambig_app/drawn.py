@@ -11,12 +11,13 @@ from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from typing import Any, Generic, TypeVar
 
-from . import figures, photograph, pipeline, plots
+from . import pipeline
+from .markup import figures, photograph, plots
 from .pipeline import Frame, frame, plots_of
-from .scenes import whole
+from .pipeline.scenes import whole
+from .pipeline.told import Slider, flex_lines, pins_of, sliders_of, spectrum_of, told
 from .state import DEFAULT, ViewState, for_eyes_of
 from .text import language
-from .told import Slider, flex_lines, pins_of, sliders_of, spectrum_of, told
 
 KEPT = 48  # states, each with its heads of about a megabyte: more than one slider passes at a time
 

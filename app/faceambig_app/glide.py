@@ -9,7 +9,7 @@ import asyncio
 import math
 from collections.abc import Callable, Iterable, Iterator
 
-from .fields import FIELDS
+from .state.fields import FIELDS
 
 SECONDS_PER_OCTAVE = 2.0
 STEP = 0.05  # seconds between two distances: as often as a slider of viser speaks

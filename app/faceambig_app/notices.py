@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from . import link
-from .fields import FIELDS
-from .forms import LONGEST, from_json
-from .link import Finding
-from .state import DEFAULT, ViewState, changed
+from .state import DEFAULT, ViewState, changed, link
+from .state.fields import FIELDS
+from .state.forms import LONGEST, from_json
+from .state.link import Finding
 from .text import say
 
 NAMED = 5  # names of settings in one notice

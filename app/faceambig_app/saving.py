@@ -11,12 +11,12 @@ from typing import Any
 
 import viser
 
-from . import own_export
 from .export import files
 from .guard import send_file
 from .notices import cause, from_file
 from .orders import Orders, Progress, Work
 from .own import OwnPhoto
+from .own import export as own_export
 from .panel.export import Shown
 from .state import ViewState
 from .text import NARROW, language, numeral, say, speaking

@@ -11,8 +11,8 @@ import msgspec
 import viser
 from msgspec import UNSET, Meta, Struct, UnsetType
 
-from .forms import one_line
 from .guard import add_reports, data_html, log_line
+from .state.forms import one_line
 
 Theme = Literal["auto", "light", "dark"]
 _Pixel = Annotated[float, Meta(ge=0, le=65_536)]

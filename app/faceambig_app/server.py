@@ -23,17 +23,17 @@ import viser
 from . import guard
 from .browser import Browser
 from .classroom import Classroom
-from .fields import FIELDS
-from .fits import model
 from .lessons import lessons
 from .orders import Orders
 from .panel.classroom import invitation
 from .panel.data import POINTS
 from .panel.export import STATES
 from .pipeline import frame
+from .pipeline.fits import model
 from .room import Dispatcher
 from .stage import FAR, FIRST_FOV, FIRST_POSITION, NEAR
 from .state import DEFAULT
+from .state.fields import FIELDS
 from .text import AUTO, say
 
 STOPPING = 0.5  # seconds for the farewells to the browsers

@@ -13,7 +13,7 @@ from typing import Any, ParamSpec, TypeVar
 from faceambig.errors import AssetError
 from faceambig.io import asset_path
 
-from .fields import LANGUAGES
+from .state.fields import LANGUAGES
 
 NARROW = "\u202f"  # thin space that does not break, before units
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from faceambig_app.faces import face
+from faceambig_app.pipeline.faces import face
 from faceambig_app.state import DEFAULT, changed
 
 DOC = (Path(__file__).parents[2] / "docs" / "ambiguity.md").read_text(encoding="utf-8")

@@ -11,9 +11,10 @@ import pytest
 from PIL import Image, ImageSequence
 
 from commands import printed, refused
-from faceambig_app import animate, pipeline
-from faceambig_app.forms import to_json
+from faceambig_app import export
+from faceambig_app.export import animate
 from faceambig_app.state import ViewState, changed
+from faceambig_app.state.forms import to_json
 from scenes import need_renderer
 
 STATE = ViewState(subject=3, camera="orthographic")
@@ -41,7 +42,7 @@ def gap(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def snapshot(state: ViewState) -> np.ndarray:
-    return pipeline.snapshot(state, width=SIZE[0], height=SIZE[1])[..., :3].astype(int)
+    return export.snapshot(state, width=SIZE[0], height=SIZE[1])[..., :3].astype(int)
 
 
 @pytest.fixture(scope="module")

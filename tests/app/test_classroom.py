@@ -16,8 +16,8 @@ from typing import Any
 import pytest
 
 from faceambig_app import drawn, guard, server
-from faceambig_app.class_page import bars_html
 from faceambig_app.classroom import Classroom, Seat
+from faceambig_app.classroom.page import bars_html
 from faceambig_app.lessons import Ask, Number, lessons
 from faceambig_app.panel.classroom import NOTE_LENGTH, Shown
 from faceambig_app.state import DEFAULT, ViewState, changed

@@ -24,8 +24,8 @@ from faceambig.io.schemes import mesh_of_ibug68
 from faceambig_app import cli, pipeline
 from faceambig_app.commands import snapshot as snapshot_command
 from faceambig_app.commands import sweep as sweep_command
-from faceambig_app.forms import command, to_json
 from faceambig_app.state import DEFAULT, FIELDS, ViewState, changed
+from faceambig_app.state.forms import command, to_json
 from scenes import need_renderer
 from states import states
 

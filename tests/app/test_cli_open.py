@@ -20,9 +20,9 @@ import faceambig as fa
 from commands import RECORD, printed, refused, write_pts
 from faceambig.io.fits import encode_fit
 from faceambig.metrics import surface_difference
-from faceambig_app import photo, sheets
 from faceambig_app.commands import progress
 from faceambig_app.files import write_pairs
+from faceambig_app.reports import photo, sheets
 from scenes import need_renderer
 
 VIEW = ("--subject", 2, "--actual", 0.4, "--yaw", 10)

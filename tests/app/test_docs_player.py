@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from faceambig_app import player
+from faceambig_app.export import player
 from faceambig_app.state import ViewState
 
 FILE = Path(__file__).resolve().parents[2] / "docs" / "ambiguity_player.html"

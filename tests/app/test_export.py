@@ -18,11 +18,22 @@ import pytest
 from faceambig.arrays import vertex_normals
 from faceambig.compose import skin
 from faceambig.io.meshes import linear
-from faceambig_app import export, faces, fits, heads, pipeline, player, stage, standalone, tracks
-from faceambig_app import told as told_of
-from faceambig_app.forms import from_json, to_json
-from faceambig_app.packing import TOLERANCE_MM, directions, packed, restored, rounded, step_of
+from faceambig_app import export, pipeline
+from faceambig_app.export import player, standalone, tracks
+from faceambig_app.export.packing import (
+    TOLERANCE_MM,
+    directions,
+    packed,
+    restored,
+    rounded,
+    step_of,
+)
+from faceambig_app.pipeline import faces, fits
+from faceambig_app.pipeline import told as told_of
+from faceambig_app.stage import heads
+from faceambig_app.stage import stage as nodes
 from faceambig_app.state import DEFAULT, ViewState, changed
+from faceambig_app.state.forms import from_json, to_json
 from faceambig_app.text import speaking
 from scenes import need_renderer
 
@@ -194,7 +205,7 @@ def test_a_picture_is_the_snapshot_with_its_origin_in_it(monkeypatch):
         assert picture.text["Software"] == "faceambig 0.1.0"
         assert picture.text["Licence"].startswith("CC0")
         pixels = np.asarray(picture)
-    np.testing.assert_array_equal(pixels, pipeline.snapshot(state)[..., :3])
+    np.testing.assert_array_equal(pixels, export.snapshot(state)[..., :3])
 
 
 def test_size_ground_and_own_photo_reach_the_renderer(monkeypatch):
@@ -367,7 +378,7 @@ def test_a_swing_bends_as_the_page_does():
 
 
 def test_light_of_the_page_and_of_the_file_are_one():
-    assert tuple(light[1:] for light in stage.LIGHTS) == player.LIGHTS
+    assert tuple(light[1:] for light in nodes.LIGHTS) == player.LIGHTS
     assert player.OCCLUSION_POWER == heads.OCCLUSION_POWER
 
 

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from faceambig.scene import Curves, Numbers, Photo
-from faceambig_app import figures, photograph, plots
+from faceambig_app.markup import figures, photograph, plots
 from faceambig_app.text import say
 
 HOSTILE = "<script>alert('x')</script> & \"quoted\" </svg></style>"

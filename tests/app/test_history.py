@@ -6,8 +6,8 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from faceambig_app.history import STEPS, VIEW, History, change, redo, reset, undo
 from faceambig_app.state import DEFAULT, ViewState, changed
+from faceambig_app.state.history import STEPS, VIEW, History, change, redo, reset, undo
 
 
 def at(metres: float) -> ViewState:

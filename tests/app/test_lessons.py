@@ -13,18 +13,25 @@ import pytest
 
 from faceambig.errors import AssetError
 from faceambig.observation import eye_distance
-from faceambig_app import link, measures
-from faceambig_app.conditions import condition
-from faceambig_app.crowd import moved_percent
-from faceambig_app.faces import curve, face
-from faceambig_app.fields import LANGUAGES
-from faceambig_app.fits import model
-from faceambig_app.lesson_page import html_of, step_html, teacher_page
-from faceambig_app.lesson_room import LessonRoom
-from faceambig_app.lessons import NUMBERS, Lessons, expressions, lessons, read_lesson, read_lessons
+from faceambig_app.lessons import (
+    NUMBERS,
+    Lessons,
+    expressions,
+    lessons,
+    measures,
+    read_lesson,
+    read_lessons,
+)
+from faceambig_app.lessons.conditions import condition
+from faceambig_app.lessons.crowd import moved_percent
+from faceambig_app.lessons.page import html_of, step_html, teacher_page
+from faceambig_app.lessons.room import LessonRoom
 from faceambig_app.panel.lessons import Shown
 from faceambig_app.pipeline import frame
-from faceambig_app.state import DEFAULT, ViewState, changed
+from faceambig_app.pipeline.faces import curve, face
+from faceambig_app.pipeline.fits import model
+from faceambig_app.state import DEFAULT, ViewState, changed, link
+from faceambig_app.state.fields import LANGUAGES
 from faceambig_app.text import speaking
 
 ROOT = Path(__file__).parents[2]

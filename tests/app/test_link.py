@@ -14,12 +14,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from damage import cases
-from faceambig_app import cli, link, script
+from faceambig_app import cli, script
 from faceambig_app.commands import snapshot
-from faceambig_app.forms import command, flags, from_json, rounded, text_of, to_json, value_of
-from faceambig_app.link import Finding, query, to_digits
 from faceambig_app.notices import from_query
-from faceambig_app.state import DEFAULT, FIELDS, ViewState, changed
+from faceambig_app.state import DEFAULT, FIELDS, ViewState, changed, link
+from faceambig_app.state.forms import command, flags, from_json, rounded, text_of, to_json, value_of
+from faceambig_app.state.link import Finding, query, to_digits
 from states import random_states, states
 
 PARSER = cli.parser()

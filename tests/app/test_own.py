@@ -18,10 +18,12 @@ import faceambig as fa
 from faceambig import compose
 from faceambig.observation import portrait_camera
 from faceambig.render import painter
-from faceambig_app import link, notices, own, own_page, placing
-from faceambig_app.own_room import OwnRoom
-from faceambig_app.photograph import photo_marks
-from faceambig_app.state import DEFAULT, ViewState, changed
+from faceambig_app import notices, own
+from faceambig_app.markup.photograph import photo_marks
+from faceambig_app.own import page as own_page
+from faceambig_app.own import placing
+from faceambig_app.own.room import OwnRoom
+from faceambig_app.state import DEFAULT, ViewState, changed, link
 
 VIEW: dict[str, Any] = {"distance": 0.5, "yaw_deg": 10.0}
 SIDE = 600  # pixels of the photograph; a synthetic one counts its points in 500

@@ -18,10 +18,11 @@ from faceambig import compose
 from faceambig.metrics import surface_difference
 from faceambig.observation import portrait_camera
 from faceambig.render import overlay, painter
-from faceambig_app import export, own, own_export
-from faceambig_app.forms import from_json
+from faceambig_app import export, own
+from faceambig_app.own import export as own_export
 from faceambig_app.saving import Saving
 from faceambig_app.state import ViewState, changed
+from faceambig_app.state.forms import from_json
 
 VIEW: dict[str, Any] = {"distance": 0.5, "yaw_deg": 10.0}
 STATE = ViewState(subject="photo", distance=1.5)

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from faceambig.scene import Curves, Legend, Numbers, Photo, View
-from faceambig_app import figures, photograph, plots, plottable, style
+from faceambig_app.markup import figures, photograph, plots, plottable, style
 from faceambig_app.text import say
 from scenes import legend as a_legend
 from scenes import photo as egg

@@ -9,11 +9,11 @@ from unittest.mock import MagicMock
 
 import numpy as np
 
-from faceambig_app import figures
-from faceambig_app.actions import ACTIONS, rename, unpin
+from faceambig_app.markup import figures
 from faceambig_app.panel import Change, Panel
 from faceambig_app.panel.export import Shown
 from faceambig_app.state import DEFAULT, ViewState, changed, names_of_pins
+from faceambig_app.state.actions import ACTIONS, rename, unpin
 
 
 class Widget:

@@ -23,8 +23,8 @@ from faceambig.io.pictures import Picture, read_picture
 from faceambig.observation import portrait_camera
 from faceambig.render import fitted, painter
 from faceambig_app import files as out_files
-from faceambig_app import photo
-from faceambig_app.photo import NAMES
+from faceambig_app.reports import photo
+from faceambig_app.reports.photo import NAMES
 
 PHOTOS = Path(__file__).resolve().parents[3] / "shared" / "data" / "photos"
 VIEW: dict[str, Any] = {"distance": 0.5, "yaw_deg": 15.0}

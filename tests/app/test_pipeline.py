@@ -19,14 +19,14 @@ from faceambig.flex import Linearisation, plausible_limit
 from faceambig.metrics import surface_difference
 from faceambig.rotation import rotation_matrix
 from faceambig.scene import Curves
-from faceambig_app import faces, files, fits, likely, pipeline, scenes
+from faceambig_app import files, pipeline
 from faceambig_app.drawn import Drawn
-from faceambig_app.fields import VIEWS
-from faceambig_app.likely import Source
-from faceambig_app.pipeline import draft, frame, plots_of
+from faceambig_app.pipeline import draft, faces, fits, frame, likely, plots_of, scenes
+from faceambig_app.pipeline.likely import Source
+from faceambig_app.pipeline.told import flex_lines, flex_of, pins_of, sliders_of, spectrum_of, told
 from faceambig_app.state import DEFAULT, FIELDS, ViewState, changed
+from faceambig_app.state.fields import VIEWS
 from faceambig_app.text import say
-from faceambig_app.told import flex_lines, flex_of, pins_of, sliders_of, spectrum_of, told
 from states import made, values
 
 STEPS = (fits, likely, faces, scenes)

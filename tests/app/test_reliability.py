@@ -24,13 +24,14 @@ import pytest
 import viser
 
 from faceambig_app import browser as browser_module
-from faceambig_app import drawn, photograph, pipeline, server
-from faceambig_app.link import query
+from faceambig_app import drawn, pipeline, server
+from faceambig_app.markup import photograph
 from faceambig_app.panel import Panel
+from faceambig_app.pipeline.scenes import photo_jpeg
 from faceambig_app.room import Room
-from faceambig_app.scenes import photo_jpeg
 from faceambig_app.stage import Stage
 from faceambig_app.state import DEFAULT, changed
+from faceambig_app.state.link import query
 
 SOON = 60.0  # seconds: other tests share the processors
 FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"

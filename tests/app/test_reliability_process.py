@@ -182,7 +182,8 @@ import resource, sys
 from pathlib import Path
 import numpy as np
 import faceambig as fa, faceambig.io as fio
-from faceambig_app import files, photo
+from faceambig_app import files
+from faceambig_app.reports import photo
 from strategies import face_of, tiny_model
 model = tiny_model(n_vertices=400, n_modes=6, seed=4)
 fit = fa.fit(model, fa.observe(face_of(model, np.zeros(6)), distance=0.6, scheme="all"), distance=0.6)

@@ -16,8 +16,8 @@ from commands import printed, refused
 from faceambig import experiments
 from faceambig.experiments import fig1
 from faceambig.experiments.protocol import Claim, Experiment, Outcome, Step, Table
-from faceambig_app import report
 from faceambig_app.commands import reproduce
+from faceambig_app.reports import report
 
 QUICK = ("reproduce", "fig4a", "fig1", "--quick")
 

@@ -9,11 +9,11 @@ from unittest.mock import MagicMock
 import pytest
 
 from faceambig_app import saving
-from faceambig_app.forms import to_json
 from faceambig_app.orders import Work
 from faceambig_app.panel.export import Shown
 from faceambig_app.saving import Saving, size_text
 from faceambig_app.state import DEFAULT, ViewState
+from faceambig_app.state.forms import to_json
 
 
 class Loop:

@@ -9,7 +9,7 @@ import pytest
 
 from faceambig.render.overlay import encode_png
 from faceambig_app import ViewState, snapshot
-from faceambig_app.fits import model
+from faceambig_app.pipeline.fits import model
 from faceambig_app.state import changed
 from scenes import GOLDEN, need_renderer
 

@@ -17,11 +17,11 @@ import numpy as np
 import pytest
 
 from faceambig.scene import Head, Lines, Marks, Scene, View
-from faceambig_app import guard, viewer
-from faceambig_app.heads import APART, LETTER, fitted, shaded
-from faceambig_app.marks import CROSS, DISC
-from faceambig_app.stage import Stage
-from faceambig_app.viewer import LENS, ZOOM_1
+from faceambig_app import guard
+from faceambig_app.stage import Stage, viewer
+from faceambig_app.stage.heads import APART, LETTER, fitted, shaded
+from faceambig_app.stage.marks import CROSS, DISC
+from faceambig_app.stage.viewer import LENS, ZOOM_1
 from scenes import FRONT, PIVOT, SIDE, head, scene, strip
 
 

@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from faceambig_app.fields import canonical, tidy
 from faceambig_app.state import (
     DEFAULT,
     FIELDS,
@@ -23,6 +22,7 @@ from faceambig_app.state import (
     names_of_pins,
     short,
 )
+from faceambig_app.state.fields import canonical, tidy
 from states import alone, states, values
 
 NUMBERS = [field for field in FIELDS.values() if field.kind in ("number", "whole")]

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from faceambig_app.link import query
 from faceambig_app.state import DEFAULT, changed
+from faceambig_app.state.link import query
 from visitor import PATIENCE, Visitor, artefacts
 
 pytestmark = pytest.mark.browser

@@ -11,10 +11,10 @@ from playwright.sync_api import Browser, FilePayload
 from playwright.sync_api import Page as Tab
 
 from faceambig_app import server
-from faceambig_app.forms import from_json, to_json
 from faceambig_app.guard import downloads
-from faceambig_app.link import read
 from faceambig_app.state import DEFAULT, ViewState, changed
+from faceambig_app.state.forms import from_json, to_json
+from faceambig_app.state.link import read
 from scenes import need_renderer
 
 pytestmark = [pytest.mark.browser, pytest.mark.gl]

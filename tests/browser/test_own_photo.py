@@ -19,7 +19,8 @@ import faceambig as fa
 from faceambig import compose
 from faceambig.observation import portrait_camera
 from faceambig.render import painter
-from faceambig_app import own, placing, server
+from faceambig_app import own, server
+from faceambig_app.own import placing
 
 pytestmark = pytest.mark.browser
 

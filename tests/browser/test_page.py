@@ -8,7 +8,8 @@ import re
 import numpy as np
 import pytest
 
-from faceambig_app import ViewState, drawn, faces, fits
+from faceambig_app import ViewState, drawn
+from faceambig_app.pipeline import faces, fits
 from visitor import PATIENCE, SEEN
 
 pytestmark = pytest.mark.browser

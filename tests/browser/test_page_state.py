@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from faceambig_app import cli, forms, history, room, server
-from faceambig_app.actions import ACTIONS
+from faceambig_app import cli, room, server
 from faceambig_app.glide import STILLS
-from faceambig_app.link import query, to_digits
-from faceambig_app.state import DEFAULT, changed
+from faceambig_app.state import DEFAULT, changed, forms, history
+from faceambig_app.state.actions import ACTIONS
+from faceambig_app.state.link import query, to_digits
 from visitor import PATIENCE, SEEN, Visitor, artefacts
 
 pytestmark = pytest.mark.browser

@@ -13,7 +13,8 @@ from playwright.sync_api import Browser, Page
 
 from faceambig.arrays import vertex_normals
 from faceambig.compose import difference_colours, pivot
-from faceambig_app import faces, fits, player
+from faceambig_app.export import player
+from faceambig_app.pipeline import faces, fits
 from faceambig_app.state import ViewState, changed
 from faceambig_app.text import percent_number
 

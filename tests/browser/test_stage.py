@@ -13,7 +13,8 @@ from PIL import Image
 from playwright.sync_api import Page
 
 from faceambig.scene import Lines, Marks, Scene
-from faceambig_app import figures, guard
+from faceambig_app import guard
+from faceambig_app.markup import figures
 from faceambig_app.script import Script
 from faceambig_app.stage import FAR, FIRST_FOV, FIRST_POSITION, NEAR, Stage
 from scenes import FRONT, head, photo, scene, strip

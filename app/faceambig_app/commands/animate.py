@@ -63,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
     writable(out)  # before the work, not after it
     with speaking(state.lang):
         if ending == ".html":
-            from ..player import page
+            from ..export.player import page
 
             _, data = page(state, whats=(options.what,))
         else:
@@ -73,7 +73,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _animation(state: Any, kind: str, asked: dict[str, Any]) -> bytes:
-    from ..animate import animation
+    from ..export.animate import animation
 
     terminal = sys.stderr.isatty()
     try:

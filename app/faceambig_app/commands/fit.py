@@ -27,7 +27,7 @@ def add(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Fit a face to a photograph, or to the points of one; write picture, meshes and numbers if asked."""
-    from .. import photo
+    from ..reports import photo
 
     out = None if options.out is None else photo.folder(options.out)  # before the work, not after
     start = start_of(options, pixels=options.contours or out is not None)

@@ -59,7 +59,7 @@ def _add_face(result: Result, modes: fa.FlexibilityModes, k: int, mm: float, lim
     words = f"flexibility mode {k + 1}, {mm:+.3g} mm: {modes.words[k]}"
     result.faces.append((name_of("mode", k, mm), alpha, words))
     if k < DRAWN:
-        from ..sheets import mode_face
+        from ..reports.sheets import mode_face
 
         d_l = _landmark_error(fit, alpha, modes.camera(k, mm))
         # at the end of the reach itself, too

@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..fields import canonical
-from ..forms import value_of
 from ..state import DEFAULT, FIELDS
+from ..state.fields import canonical
+from ..state.forms import value_of
 from .shared import notes_of
 from .snapshot import help_of
 
@@ -109,7 +109,7 @@ def start_of(options: argparse.Namespace, *, pixels: bool = False) -> Start:
         return _saved(options, file)
     import faceambig as fa
 
-    from .. import photo
+    from ..reports import photo
 
     model = fa.load_model(options.model or DEFAULT.model)
     landmarks = None if options.landmarks is None else Path(options.landmarks)
@@ -172,7 +172,7 @@ def _synthetic(options: argparse.Namespace, pixels: bool) -> Start:
     }
     target = DEFAULT.target._replace(model=options.model or DEFAULT.model, **values)
 
-    from .. import fits, scenes
+    from ..pipeline import fits, scenes
 
     taken = fits.photograph(target)
     picture = None

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     import faceambig as fa
     from faceambig.arrays import Array
 
-    from ..sheets import Bent
+    from ..reports.sheets import Bent
 
 BENT_SD = 2.0  # of drawn posterior modes
 DRAWN = 3  # modes in the picture
@@ -88,7 +88,7 @@ def posterior(options: argparse.Namespace, fit: fa.Fit) -> Result:
             )
         )
         if k < DRAWN:
-            from ..sheets import deviation_face
+            from ..reports.sheets import deviation_face
 
             moved = abs(sd) * float(modes.landmark_percent[k])
             result.drawn.append(deviation_face(k + 1, sd, alpha, moved))
@@ -101,7 +101,7 @@ def posterior(options: argparse.Namespace, fit: fa.Fit) -> Result:
 def extremes(options: argparse.Namespace, fit: fa.Fit) -> Result:
     import faceambig as fa
 
-    from ..sheets import extreme_face
+    from ..reports.sheets import extreme_face
 
     tolerance = 3.0 if options.tolerance is None else options.tolerance
     with Progress("starts", STARTS) as progress:

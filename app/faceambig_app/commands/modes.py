@@ -112,7 +112,7 @@ def run(options: argparse.Namespace) -> int:
     if plot is not None:
         from faceambig.render.overlay import encode_png
 
-        from ..sheets import faces_sheet
+        from ..reports.sheets import faces_sheet
 
         drawn = faces_sheet(fit, result.drawn, note)
         files[plot] = encode_png(drawn, {"Software": "faceambig", "Description": note})
@@ -126,7 +126,7 @@ def run(options: argparse.Namespace) -> int:
 def _folder(options: argparse.Namespace) -> Path | None:
     if options.out is None:
         return None
-    from ..photo import folder
+    from ..reports.photo import folder
 
     return folder(options.out, ())
 
@@ -151,7 +151,7 @@ def _meshes(
     fit: fa.Fit, faces: Iterable[tuple[str, Array, str]], note: str
 ) -> Iterator[tuple[str, bytes]]:
     """Files of the faces, the fitted one first, in every format."""
-    from ..photo import face_meshes
+    from ..reports.photo import face_meshes
 
     faces = [("fit", fit.alpha, "the fitted face"), *faces]
     with Progress("faces", len(faces)) as progress:

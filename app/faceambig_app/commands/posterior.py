@@ -6,8 +6,8 @@ import argparse
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
-from ..forms import value_of
 from ..state import DEFAULT, FIELDS, changed
+from ..state.forms import value_of
 from .inputs import Start, add_fitting, add_input, fitting, start_of
 from .progress import Progress
 from .shared import (
@@ -93,7 +93,7 @@ def run(options: argparse.Namespace) -> int:
     if plot is not None:
         from faceambig.render.overlay import encode_png
 
-        from ..sheets import posterior_sheet
+        from ..reports.sheets import posterior_sheet
 
         drawn = posterior_sheet(found, sd, start.true_distance, prior, note)
         files[plot] = encode_png(drawn, {"Software": "faceambig", "Description": note})
@@ -113,7 +113,7 @@ def _folder(options: argparse.Namespace) -> Path | None:
         return None
     if not 1 <= options.draws <= MOST_DRAWS:
         raise ValueError(f"--draws: {options.draws} is not within 1 to {MOST_DRAWS}")
-    from ..photo import folder
+    from ..reports.photo import folder
 
     return folder(options.out, ())
 
@@ -239,7 +239,7 @@ def _draws(
     """A mesh a draw, and a table of all."""
     import numpy as np
 
-    from ..photo import face_meshes
+    from ..reports.photo import face_meshes
 
     seed = _seed(options)
     drawn = found.sample(options.draws, seed)

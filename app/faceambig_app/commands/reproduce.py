@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from faceambig.experiments.protocol import Outcome, Settings, Step
 
-    from ..report import Done
+    from ..reports.report import Done
 
 OUT = "faceambig-report"
 UNFINISHED = "unfinished"  # folder in OUT: what a run that was stopped had finished
@@ -155,7 +155,7 @@ def _one(name: str, settings: Settings, *, alone: bool) -> Done:
     """One experiment. What the model lacks for it is said in the report, unless it is all that was asked for."""
     from faceambig.experiments import experiment
 
-    from ..report import Done
+    from ..reports.report import Done
 
     asked = experiment(name)
     with TimeLeft(name) as progress:
@@ -170,7 +170,7 @@ def _one(name: str, settings: Settings, *, alone: bool) -> Done:
 def _write(out: Path, done: Sequence[Done], settings: Settings) -> list[str]:
     """All files or none; their names."""
     from ..files import write_all
-    from ..report import drawn, files_of, html
+    from ..reports.report import drawn, files_of, html
 
     pictures = {each.outcome.name: drawn(each.outcome) for each in done if each.outcome}
     inside: dict[str, bytes] = {}
@@ -195,7 +195,7 @@ def _asked(settings: Settings) -> dict[str, str]:
 
 
 def _record(done: Done) -> dict[str, Any]:
-    from ..report import record_of
+    from ..reports.report import record_of
 
     if done.outcome is None:
         return {"name": done.experiment.name, "failure": done.failure}
@@ -212,7 +212,7 @@ def _lines(done: Sequence[Done]) -> Iterator[str]:
 
 
 def _claim_lines(outcome: Outcome) -> Iterator[str]:
-    from ..report import verdict
+    from ..reports.report import verdict
 
     for claim in outcome.claims:
         yield f"  {verdict(claim)}: {claim.words}"

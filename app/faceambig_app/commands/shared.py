@@ -68,7 +68,7 @@ def written(
 ) -> list[str]:
     """Write all files, and those `inside` a folder by name, or none; what was written, in order."""
     from ..files import write_all
-    from ..photo import write_folder
+    from ..reports.photo import write_folder
 
     done = [str(path) for path in files]
     if folder is None:

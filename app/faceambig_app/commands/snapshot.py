@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from ..forms import LONGEST, from_json, text_of, value_of
 from ..state import DEFAULT, FIELDS, Field, ViewState, changed
+from ..state.forms import LONGEST, from_json, text_of, value_of
 from .shared import GOOD
 
 
@@ -49,8 +49,8 @@ def run(options: argparse.Namespace) -> int:
             raise ValueError(f"width, height: {side} is not within 64 to 8192 pixels")
     from pathlib import Path
 
+    from ..export import snapshot
     from ..files import writable
-    from ..pipeline import snapshot
 
     writable(Path(options.out))  # before the work, not after it
     snapshot(state, options.out, width=options.width, height=options.height)

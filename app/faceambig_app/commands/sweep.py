@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     import faceambig as fa
     from faceambig.arrays import Array
 
-    from ..sheets import Reference
+    from ..reports.sheets import Reference
 
 HEADER = (
     "distance_m",
@@ -156,7 +156,7 @@ def _picture(sweep: fa.Sweep, gaps: Sequence[float], reference: Reference, start
     from faceambig.render.overlay import encode_png
     from faceambig.scene import Curves
 
-    from ..sheets import sweep_sheet
+    from ..reports.sheets import sweep_sheet
 
     curves = Curves(
         distances=sweep.distances,

@@ -14,13 +14,15 @@ import viser
 
 from .access import make_access, make_token, needs_token
 from .data import add_colours, data_html
-from .door import Door, Hooks, ServeError, log_line
+from .door import Door, Hooks
 from .downloads import send_file
 from .hooks import install, opened
 from .invitation import links, qr_code, qr_svg
+from .log import log_line
 from .messages import MAX_BAD, MAX_MESSAGE
 from .page import PATCHES, make_page, our_script
 from .panels import clear
+from .pinned import ServeError
 from .reports import MAX_REPORT, add_reports
 from .requests import listen
 from .sessions import Limits, languages, leads

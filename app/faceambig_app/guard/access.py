@@ -16,7 +16,7 @@ import secrets
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
-from .door import ServeError
+from .pinned import ServeError
 
 OWN = ("127.0.0.1", "::1")  # reached from this machine only; 127.0.0.2 may be forwarded
 SHORTEST = 16  # characters of a token: guessing takes for ever

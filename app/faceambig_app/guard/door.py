@@ -1,33 +1,19 @@
-"""One server of ours and what its parts share: what the page is told, the log, errors in words."""
+"""One server of ours and what its parts share: its limits, its page, and what the page is told."""
 
 from __future__ import annotations
 
 import asyncio
-import logging
 import socket
-import threading
-import time
-from collections import deque
 from collections.abc import Callable, Collection
 from contextvars import ContextVar
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..text import AUTO
-
-# First of all: what the others take from viser is there
-from .pinned import VISER, ServeError
-
-if TYPE_CHECKING:
-    from .access import Access
-    from .page import Page
-    from .sessions import Limits, Session
-
-__all__ = [
-    "DOOR", "LINES", "LOG", "VISER", "Door", "Held", "Hooks", "ServeError", "log_line",
-]  # fmt: skip
-
-LOG = logging.getLogger(__package__)
+from .access import Access
+from .log import LOG, log_line
+from .page import Page
+from .sessions import Limits, Session
 
 
 def _no_words(_control: Any, _asked: object, _put: object) -> str:
@@ -87,43 +73,3 @@ class Door:
 
 
 DOOR: ContextVar[Door | None] = ContextVar("door of the running connection", default=None)
-
-
-class Lines:
-    """When the last lines of the log were written: so many in so long, for whoever sends what costs a line."""
-
-    MOST, SECONDS = 20, 10.0
-
-    def __init__(self) -> None:
-        self._written: deque[float] = deque(maxlen=self.MOST)
-        self._left_out = 0
-        self._one = threading.Lock()
-
-    def room(self) -> int | None:
-        """How many lines were left out before this one; None if this one is too."""
-        with self._one:
-            now = time.monotonic()
-            if len(self._written) == self.MOST and now - self._written[0] < self.SECONDS:
-                self._left_out += 1
-                return None
-            self._written.append(now)
-            left_out, self._left_out = self._left_out, 0
-            return left_out
-
-    def clear(self) -> None:
-        with self._one:
-            self._written.clear()
-            self._left_out = 0
-
-
-LINES = Lines()
-
-
-def log_line(text: str) -> None:
-    """One line of the log, whatever is in the text."""
-    left_out = LINES.room()
-    if left_out is None:
-        return
-    if left_out:
-        LOG.warning("page: %d lines are left out", left_out)
-    LOG.warning("page: %s", text[:200].encode("unicode_escape").decode())

@@ -27,7 +27,8 @@ from viser import (
 from viser.infra import _infra
 from viser.infra._async_message_buffer import AsyncMessageBuffer
 
-from .door import DOOR, Door, log_line
+from .door import DOOR, Door
+from .log import log_line
 from .messages import MAX_MESSAGE, consume, dispatch
 from .pinned import ServeError, check_viser
 from .requests import answer, dress, preferred

@@ -11,7 +11,8 @@ import msgspec
 from viser.infra import _infra
 
 from ..text import AUTO, speaking
-from .door import DOOR, log_line
+from .door import DOOR
+from .log import log_line
 from .sessions import SESSION
 
 MAX_MESSAGE = 768 * 1024  # bytes; an upload arrives in parts of 512 KiB

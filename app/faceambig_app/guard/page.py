@@ -20,7 +20,7 @@ from faceambig.io import asset_path
 
 from ..text import words
 from .data import data_meta
-from .door import VISER, ServeError
+from .pinned import VISER, ServeError
 
 # assets/page/*.js, joined in this order
 PARTS = (

@@ -8,7 +8,8 @@ from typing import Any
 
 import viser
 
-from .door import Door, log_line
+from .door import Door
+from .log import log_line
 
 MAX_REPORT = 8192  # characters: an address of 7000 among them
 

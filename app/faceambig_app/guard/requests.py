@@ -13,9 +13,10 @@ from collections.abc import Iterable, Sequence
 from websockets import Headers
 from websockets.http11 import Request, Response
 
-from ..link import IGNORED, ignored, told_ignored
+from ..state.link import IGNORED, ignored, told_ignored
 from .access import Access
-from .door import Door, ServeError
+from .door import Door
+from .pinned import ServeError
 
 HEADERS = {
     "X-Content-Type-Options": "nosniff",

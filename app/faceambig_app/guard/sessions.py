@@ -14,7 +14,8 @@ import numpy as np
 from viser.infra import _infra
 from viser.infra._async_message_buffer import AsyncMessageBuffer
 
-from .door import ServeError, log_line
+from .log import log_line
+from .pinned import ServeError
 
 AT_WORK = 16  # handlers of one browser that may be at work before its next message is read
 IN_TRANSPORT = 32 * 1024 * 1024  # bytes written and not taken: more than the largest frame of ours

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 import viser
 
-from ..fields import tidy
+from ..state.fields import tidy
 from ..text import say
 from .widgets import Widgets
 

@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import viser
 
-from ..actions import rename, unpin, visit
-from ..fields import PIN_NAME_LENGTH, PINS
 from ..state import ViewState, names_of_pins
+from ..state.actions import rename, unpin, visit
+from ..state.fields import PIN_NAME_LENGTH, PINS
 from ..text import say
 from .widgets import Change, Widgets
 

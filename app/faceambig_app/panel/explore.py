@@ -7,7 +7,7 @@ from typing import Any
 
 import viser
 
-from ..fields import FIELDS
+from ..state.fields import FIELDS
 from ..text import say
 from .widgets import Widgets
 

@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 import viser
 from viser._messages import GuiSliderMark  # a slider's marks have no setter that is public
 
-from ..actions import draw_next, surprise
-from ..fields import FIELDS, MODES
 from ..state import ViewState, changed
+from ..state.actions import draw_next, surprise
+from ..state.fields import FIELDS, MODES
 from ..text import say
 from .explore import folder
 from .widgets import Change, Widgets

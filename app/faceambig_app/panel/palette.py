@@ -7,7 +7,7 @@ from typing import Any
 
 import viser
 
-from ..actions import ACTIONS
+from ..state.actions import ACTIONS
 from ..text import say
 
 

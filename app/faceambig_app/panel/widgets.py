@@ -12,8 +12,8 @@ from typing import Any
 
 import viser
 
-from ..fields import FIELDS, Field
 from ..state import ViewState, changed
+from ..state.fields import FIELDS, Field
 from ..text import numeral, say
 
 Change = Callable[[ViewState], ViewState]

@@ -1,0 +1,18 @@
+"""Lessons: files that a teacher can write, what is asked and ticked in them, and the numbers that they may say."""
+
+from .reading import (
+    NUMBERS,
+    Ask,
+    Lesson,
+    Lessons,
+    Number,
+    Step,
+    expressions,
+    lessons,
+    read_lesson,
+    read_lessons,
+)
+
+__all__ = [
+    "NUMBERS", "Ask", "Lesson", "Lessons", "Number", "Step", "expressions", "lessons", "read_lesson", "read_lessons",
+]  # fmt: skip

@@ -1,0 +1,1 @@
+"""A Scene as HTML and SVG of the page: words, numbers, the photograph, the curves, their style."""
