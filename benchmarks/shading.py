@@ -70,9 +70,8 @@ class Row:
     light: str
     d_l_percent: float
     d_s_mm: float
-    normals_deg: (
-        float  # mean angle between the two faces' normals, camera axes, over what is compared
-    )
+    # Mean angle between the two faces' normals, camera axes, over what is compared
+    normals_deg: float
     fraction: float
     kept_fraction: float
     residual: float  # in sd of the target

@@ -25,9 +25,8 @@ class Laplace:
     kappas: Array  # (D,) per metre, ascending
     means: Array  # (D, S)
     precisions: Array  # (D, S, S)
-    log_evidence: (
-        Array  # (D,) log of the integral over alpha and pose, the same constant left out of all
-    )
+    # (D,) log of the integral over alpha and pose, the same constant left out of all
+    log_evidence: Array
     box: float  # k, may be inf
 
 
@@ -53,6 +52,7 @@ def laplace_at(problem: Problem, fits: Sequence[Fit]) -> Laplace:
 
 
 def refuse_unconverged(fit: Fit) -> None:
+    """NotConverged, of one line, where a fit has not: its curvature is of no minimum."""
     if not fit.converged:
         where = "the orthographic fit" if fit.distance is None else f"the fit at {fit.distance:g} m"
         raise NotConverged(

@@ -13,16 +13,13 @@ from .model import FaceModel, Scheme, Subject
 from .rotation import rotation_from_angles
 from .visibility import visible_vertices
 
-MIN_POINTS = (
-    6  # six pose unknowns at a known distance; fewer leave the pose itself open (MATH.md 8.4)
-)
-FLATTEST = (
-    1e-3  # smallest ratio of the two singular values of the points before they count as one line
-)
+# Six pose unknowns at a known distance; fewer leave the pose itself open (MATH.md 8.4)
+MIN_POINTS = 6
+# Smallest ratio of the two singular values of the points before they count as one line
+FLATTEST = 1e-3
 LARGEST_PX = 1e9  # pixels from 0: far beyond every picture, and squares of it are still exact sums
-SMALLEST_PX = (
-    1e-6  # pixels from end to end of the points: coordinates in units of a picture are far above
-)
+# Pixels from end to end of the points: coordinates in units of a picture are far above
+SMALLEST_PX = 1e-6
 HEAVIEST = 1e9  # ratio of the largest weight to 1 and of 1 to the smallest
 DISTANCES = (
     0.2,
@@ -30,9 +27,8 @@ DISTANCES = (
 )  # metres, of the camera that took the photograph; nearer, the nose leaves the lens's view
 LARGEST_EYES_PX = 1e6
 DENSE = ("all", "visible")  # `scheme` of observe: vertices of the surface instead of landmarks
-EYES_PX = (
-    100.0  # synthetic photographs: frontal distance of the eye centres in a picture of 500 x 500
-)
+# Synthetic photographs: frontal distance of the eye centres in a picture of 500 x 500
+EYES_PX = 100.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -45,9 +45,8 @@ class FaceSamples:
 
     model: FaceModel
     alpha: Array  # (n, S) standard deviations
-    distances: (
-        Array  # (n,) metres; inf: beyond the last distance, drawn under the orthographic camera
-    )
+    # (n,) metres; inf: beyond the last distance, drawn under the orthographic camera
+    distances: Array
 
     def __post_init__(self) -> None:
         for name in ("alpha", "distances"):

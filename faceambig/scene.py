@@ -23,19 +23,16 @@ class Head:
     vertices: Array  # (V, 3) metres
     faces: NDArray[np.uint32]  # (F, 3)
     colours: NDArray[np.uint8]  # (V, 3) sRGB
-    occlusion: NDArray[np.uint8] | None = (
-        None  # (V,) ambient occlusion, 255 open; darkens `colours`
-    )
-    lit: bool = (
-        True  # False: colours are values of a legend and are shown as they are, shading reduced
-    )
+    # (V,) ambient occlusion, 255 open; darkens `colours`
+    occlusion: NDArray[np.uint8] | None = None
+    # False: colours are values of a legend and are shown as they are, shading reduced
+    lit: bool = True
     slot: float = 0.0  # metres along the viewer's right
     caption: tuple[
         tuple[str, str], ...
     ] = ()  # lines under the head: (text, tone), tone "dim", "d_l" or "d_s"
-    coarse_faces: NDArray[np.uint32] | None = (
-        None  # over the first vertices: the mesh while a hand moves
-    )
+    # Over the first vertices: the mesh while a hand moves
+    coarse_faces: NDArray[np.uint32] | None = None
     values_mm: Array | None = None  # (V,) what colours of a legend mean; NaN: not measured
     opacity: float = 1.0  # below 1: a ghost; of heads in one slot the nearer surface covers the farther by this share
 
@@ -87,22 +84,18 @@ class Photo:
     occlusion: NDArray[np.uint8] | None
     focal: float  # pixels
     principal: tuple[float, float]  # pixels
-    fit_vertices: Array | None = (
-        None  # (V, 3) the fitted face in camera axes, for the view "camera"
-    )
+    # (V, 3) the fitted face in camera axes, for the view "camera"
+    fit_vertices: Array | None = None
     fit_focal: float | None = None  # pixels, per metre of depth as `focal`
-    fit_eyes: float = (
-        1.0  # distance of the fitted face's eyes in the picture, for that of the observed ones
-    )
+    # Distance of the fitted face's eyes in the picture, for that of the observed ones
+    fit_eyes: float = 1.0
     pixels: NDArray[np.uint8] | None = None  # (height, width, 3) a real photograph, drawn instead
     points_shown: bool = True
     names_shown: bool = False
-    error_scale: float = (
-        0.0  # a line from each cross towards its circle, this many times its length
-    )
-    outline: Array | None = (
-        None  # (n, 2) pixels, the fitted face's outline; NaN rows part its pieces
-    )
+    # A line from each cross towards its circle, this many times its length
+    error_scale: float = 0.0
+    # (n, 2) pixels, the fitted face's outline; NaN rows part its pieces
+    outline: Array | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

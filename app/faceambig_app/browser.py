@@ -94,9 +94,8 @@ class Browser:
             loop, self._own_changed, self.notice, steps=lambda: len(self._history.past)
         )
         self._own.model = DEFAULT.model
-        self._hint: float | None = (
-            None  # metres: of the camera, as the own photograph's file tells it
-        )
+        # Metres: of the camera, as the own photograph's file tells it
+        self._hint: float | None = None
         self._saving = Saving(
             client, loop, orders, now=lambda: self.room.state, go=self._opened,
             show=lambda shown: self.panel.export.show(shown), notice=self.notice,

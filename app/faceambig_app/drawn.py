@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, Generic, TypeVar
 
 from . import pipeline
-from .markup import figures, photograph, plots
+from .markup import figures, photograph, plots, plottable
 from .pipeline import Frame, frame, plots_of
 from .pipeline.scenes import whole
 from .pipeline.told import Slider, flex_lines, pins_of, sliders_of, spectrum_of, told
@@ -73,7 +73,7 @@ class Drawn:
         """The plots; of a new target a sweep and a posterior."""
         shown = plots_of(self.state)
         drawn = plots.plots(shown, self.scene.numbers, hide=self.state.hide, brief=self._draft)
-        return drawn if shown.density is not None else drawn + plots.nothing_likely()
+        return drawn if shown.density is not None else drawn + plottable.nothing_likely()
 
     @_once
     def legend(self) -> str:
@@ -135,9 +135,8 @@ _KEPT = Kept()
 
 def drawn(state: ViewState, draft: bool, rested: ViewState | None) -> Drawn:
     """A state as all browsers show it; `rested`: what this one showed in full last, which a draft may need."""
-    state = for_eyes_of(
-        state, DEFAULT
-    )  # no picture depends on those, words on the language that is spoken
+    # No picture depends on whose eyes they are, words on the language that is spoken
+    state = for_eyes_of(state, DEFAULT)
     if not draft:
         return _KEPT.get(
             (state, language(), None), lambda: Drawn(state, frame(state, with_curves=False), False)

@@ -117,9 +117,8 @@ class Dispatcher:
         self._served: dict[Any, Turn] = {}
         self._late_at_once = max(1, workers - 1)
         self._booked: dict[Any, float] = {}  # monotonic seconds of a later turn, at most one a room
-        self._later: list[
-            tuple[float, int, Any]
-        ] = []  # a heap of those, and of some replaced since
+        # A heap of those, and of some replaced since
+        self._later: list[tuple[float, int, Any]] = []
         self._number = itertools.count()
         self._closed = False
         self._threads = [

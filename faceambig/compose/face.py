@@ -32,9 +32,8 @@ class Face:
     """A fitted face, bent or not, measured against the true one. N vertices, L landmarks."""
 
     fit: Fit
-    observation: (
-        Observation  # the points that pictures show: those fitted, or others of the same photograph
-    )
+    # The points that pictures show: those fitted, or others of the same photograph
+    observation: Observation
     camera: Camera  # that sees the face so: the fit's own, or a draw's
     vertices: Array  # (N, 3) metres, laid rigidly on the true face
     projected: Array  # (L, 2) pixels

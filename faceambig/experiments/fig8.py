@@ -69,9 +69,8 @@ class Statistics:
     same: Array  # (D, n) a person from nearest and from each distance
     near: Array  # (n,) the nearest other person, both from nearest
     far: Array  # (n,) both from farthest
-    found: (
-        float  # share of people whose own picture from farthest is the closest to that from nearest
-    )
+    # Share of people whose own picture from farthest is the closest to that from nearest
+    found: float
     closest: tuple[int, int, float]  # two people, from nearest and from farthest
 
 

@@ -67,9 +67,8 @@ class Step(NamedTuple):
     done: int
     total: int
     resumed: int = 0  # of those done, how many an earlier run had finished
-    worker_bytes: int = (
-        0  # most memory that one process has taken so far; 0 where that is not known
-    )
+    # Most memory that one process has taken so far; 0 where that is not known
+    worker_bytes: int = 0
 
 
 Progress = Callable[[Step], object]

@@ -24,9 +24,8 @@ Jacobian = Literal["kaufman", "full"]
 class Status(StrEnum):
     """How a fit ended; only CONVERGED is a result to rely on."""
 
-    CONVERGED = (
-        "converged"  # the projected gradient vanishes: no step inside the box lowers the cost
-    )
+    # The projected gradient vanishes: no step inside the box lowers the cost
+    CONVERGED = "converged"
     MAX_STEPS = "step limit reached"
     STALLED = "no further decrease"  # the descent came to rest before the gradient vanished
     ROUNDS = "stopped after the given rounds"  # als_rounds of them, short of the optimum
@@ -36,13 +35,11 @@ class Status(StrEnum):
 class FitOptions:
     """Options of `fit`, in the units of a user. All have defaults."""
 
-    modes: int | None = (
-        None  # S, shape modes used; None: the strongest 70, or all of a model with fewer
-    )
+    # S, shape modes used; None: the strongest 70, or all of a model with fewer
+    modes: int | None = None
     box: float | None = 2.0  # |alpha_j| <= box standard deviations; None: no box
-    noise_percent: float = (
-        1.0  # landmark sd per coordinate the prior assumes, % of the interocular distance
-    )
+    # Landmark sd per coordinate the prior assumes, % of the interocular distance
+    noise_percent: float = 1.0
     prior_weight: float | None = None  # lambda in px^2 itself, instead of noise_percent
     tolerance: float = 1e-8  # relative cost above the optimum that still counts as converged
     max_steps: int = 100

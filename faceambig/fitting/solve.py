@@ -30,16 +30,14 @@ from .boxqp import Pass, box_qp, one_pass
 from .result import Status
 
 POSE = 6  # d (3), t_xy (2), log s
-NEAREST_KAPPA = (
-    10.0  # per metre: free distances stop at 10 cm, where no face is in front of its camera
-)
+# Per metre: free distances stop at 10 cm, where no face is in front of its camera
+NEAREST_KAPPA = 10.0
 SHORT_STEP = 0.3  # below this the quadratic model is bad: damp the next step
 FIRST_DAMPING, MORE_DAMPING = 1e-5, 3.0
 POOR = 0.5  # share of the predicted decrease below which a shorter step is tried too
 LARGEST_TURN = 1.0  # radians a step; beyond, the linearised rotation says nothing
-LARGEST_GROWTH = (
-    2.0  # of log s a step, seven times as large; no overflow where the shape is hardly held
-)
+# Of log s a step, seven times as large; no overflow where the shape is hardly held
+LARGEST_GROWTH = 2.0
 QP_ROUNDS_EARLY, QP_ROUNDS = (2, 3, 4), 200  # far from the optimum the active set need not be exact
 EPS = float(np.finfo(float).eps)
 LEAST_PRIOR = 1e-10  # px^2

@@ -20,12 +20,10 @@ from .start import at_distance, centred_pinv, pose_from_points, refuse_face_from
 
 NEAREST = 0.2  # metres: nearer fits put the nose of large faces behind the camera (MATH.md 1)
 FARTHEST = 1e6  # metres; beyond, ask for camera="orthographic"
-FIRST_KAPPA = (
-    1.0  # per metre: where a free distance starts; no second basin in kappa was met (MATH.md 3)
-)
-MANY = (
-    1000  # points: dense ones; rows of the model take 20 MB, and in every pose others are visible
-)
+# Per metre: where a free distance starts; no second basin in kappa was met (MATH.md 3)
+FIRST_KAPPA = 1.0
+# Points: dense ones; rows of the model take 20 MB, and in every pose others are visible
+MANY = 1000
 
 
 @dataclass(frozen=True, slots=True, eq=False)

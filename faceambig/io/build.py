@@ -37,9 +37,8 @@ class Parts:
     modes: NDArray[Any]  # (N, 3, S), to be multiplied by `sds`
     faces: NDArray[Any]  # (F, 3) from 0, wound either way
     unit: str  # one of UNITS
-    sds: NDArray[Any] | None = (
-        None  # (S,) standard deviations, largest first; None: already in the modes
-    )
+    # (S,) standard deviations, largest first; None: already in the modes
+    sds: NDArray[Any] | None = None
     unit_is_sure: bool = True  # False: the format names none, and `unit` is what is common
     schemes: Mapping[str, Scheme] = field(default_factory=dict)
     between: Between | None = None

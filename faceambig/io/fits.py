@@ -32,9 +32,8 @@ FORMAT, VERSION = "faceambig fit", 1
 PARTS = ("model", "observation", "options", "camera", "alpha", "cost", "steps", "status")
 MAX_BYTES = 1 << 24  # 14,000 dense points take 1 MB
 BY_NAME = ("embedded", "ict")  # models that are found by their name
-SAME_COST = (
-    1e-6  # relative: another machine's rounding is far below, another model's cost far above
-)
+# Relative: another machine's rounding is far below, another model's cost far above
+SAME_COST = 1e-6
 LARGEST_KAPPA = 50.0  # per metre: two centimetres before the eyes, where no free distance ends
 T = TypeVar("T", int, float)
 SAME_PX = 1e-6  # pixels: of a cost of rounding alone no digit agrees

@@ -41,9 +41,8 @@ OUTLINE = "of the jaw, where MediaPipe's outline runs nearer the ear"
 class LandmarkFile:
     """The points of one picture that can be used, and what became of the others. L landmarks."""
 
-    points: (
-        Array  # (L, 2) pixels, x right, y down, the file's own counting; NaN = missing or left out
-    )
+    # (L, 2) pixels, x right, y down, the file's own counting; NaN = missing or left out
+    points: Array
     scheme: str  # "ibug68"
     image_size: tuple[int, int] | None = None  # width, height, pixels
     image_size_from: str = ""  # how the size was found, in words

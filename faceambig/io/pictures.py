@@ -25,9 +25,8 @@ if TYPE_CHECKING:
 EXTENSIONS = (".jpg", ".jpeg", ".png", ".webp", ".bmp", ".tif", ".tiff")
 HEADER_BYTES = 1 << 20  # JPEG: EXIF, thumbnails and colour profiles stand before the size
 MAX_SIDE = 65_535  # of a JPEG; larger sizes in other formats are damage or an attack
-MAX_PIXELS = (
-    52_000_000  # decoded: the largest telephones have 50; at the worst 1.1 GB while converted
-)
+# Decoded: the largest telephones have 50; at the worst 1.1 GB while converted
+MAX_PIXELS = 52_000_000
 # Pixels are decoded of these; of TIFF only the size is read: libtiff reports damage to stderr by itself
 FORMATS = ("JPEG", "PNG", "WEBP", "BMP")
 WEB_FORMATS = ("JPEG", "PNG", "WEBP")  # of them, what people have on a telephone

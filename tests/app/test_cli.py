@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 import faceambig as fa
 from commands import RECORD, printed, refused, write_pts
 from faceambig.io.schemes import mesh_of_ibug68
-from faceambig_app import cli, pipeline
+from faceambig_app import cli, export
 from faceambig_app.commands import snapshot as snapshot_command
 from faceambig_app.commands import sweep as sweep_command
 from faceambig_app.state import DEFAULT, FIELDS, ViewState, changed
@@ -291,7 +291,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> list[tuple[ViewState, str, dict[st
     """What a snapshot would be drawn of, without a renderer."""
     calls: list[tuple[ViewState, str, dict[str, Any]]] = []
     monkeypatch.setattr(
-        pipeline, "snapshot", lambda state, path, **size: calls.append((state, path, size))
+        export, "snapshot", lambda state, path, **size: calls.append((state, path, size))
     )
     return calls
 

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from faceambig.scene import Curves, Numbers, Photo
-from faceambig_app.markup import figures, photograph, plots
+from faceambig_app.markup import figures, photograph, plots, style
 from faceambig_app.text import say
 
 HOSTILE = "<script>alert('x')</script> & \"quoted\" </svg></style>"
@@ -56,13 +56,13 @@ PIECES = {
     "cards": lambda: figures.cards(NUMBERS),
     "flex": lambda: figures.flex_words(["nose forward, chin back"]),
     "spoken": lambda: figures.spoken(NUMBERS),
-    "marks": lambda: figures.photo_marks(photo()),
-    "picture": lambda: figures.photo_picture(b"\xff\xd8jpeg"),
-    "narrow": lambda: figures.side_by_side(figures.photo_marks(photo()), figures.cards(NUMBERS)),
-    "plots": lambda: figures.plots(curves(), NUMBERS),
-    "far plots": lambda: figures.plots(curves(5.0), replace(NUMBERS, distance=None)),
+    "marks": lambda: photograph.photo_marks(photo()),
+    "picture": lambda: photograph.photo_picture(b"\xff\xd8jpeg"),
+    "narrow": lambda: figures.side_by_side(photograph.photo_marks(photo()), figures.cards(NUMBERS)),
+    "plots": lambda: plots.plots(curves(), NUMBERS),
+    "far plots": lambda: plots.plots(curves(5.0), replace(NUMBERS, distance=None)),
     "boxes": lambda: figures.hidden_boxes(["a-1", "b-2"]),
-    "style": lambda: figures.STYLE,
+    "style": lambda: style.STYLE,
 }
 
 
@@ -75,7 +75,7 @@ def test_every_piece_is_well_formed(name):
 @pytest.mark.parametrize(
     "html",
     [
-        lambda: figures.photo_marks(photo(HOSTILE)),
+        lambda: photograph.photo_marks(photo(HOSTILE)),
         lambda: figures.flex_words([HOSTILE]),
         lambda: figures.cards(replace(NUMBERS, eyes_meaning=HOSTILE)),
     ],
@@ -92,7 +92,7 @@ def test_hostile_names_stay_text(html):
     st.text(st.characters(blacklist_categories=["Cc", "Cs"], blacklist_characters="\ufffe\uffff"))
 )
 def test_any_caption_is_shown_as_it_is(caption):
-    tree = parsed(figures.photo_marks(photo(caption)))
+    tree = parsed(photograph.photo_marks(photo(caption)))
     label = next(tree.iter("em"))
     assert (label.text or "") == caption
     assert caption in next(tree.iter("svg")).attrib["aria-label"]
@@ -126,7 +126,7 @@ def test_a_bad_result_is_warned_of_once(converged, plausible, key):
 
 
 def test_crosses_and_circles_stand_on_their_points():
-    tree = parsed(figures.photo_marks(photo()))
+    tree = parsed(photograph.photo_marks(photo()))
     paths = {path.get("id"): path.attrib["d"] for path in tree.iter("path")}
     assert next(tree.iter("svg")).attrib["viewBox"] == "0 0 500 500"
     crosses = [
@@ -147,14 +147,14 @@ def test_crosses_and_circles_stand_on_their_points():
 
 def test_marks_keep_their_size_in_a_larger_picture():
     small, large = (
-        float(re.findall(r"M\S+ \S+?l(\S+) ", figures.photo_marks(photo(size=size)))[0])
+        float(re.findall(r"M\S+ \S+?l(\S+) ", photograph.photo_marks(photo(size=size)))[0])
         for size in (500, 1000)
     )
     assert large == pytest.approx(2 * small, abs=0.1)
 
 
 def test_the_photograph_is_carried_in_the_style():
-    html = figures.photo_picture(b"\xff\xd8 a picture")
+    html = photograph.photo_picture(b"\xff\xd8 a picture")
     data = re.search(r"base64,([^)]*)\)", html)
     assert data is not None
     assert base64.b64decode(data[1]) == b"\xff\xd8 a picture"
@@ -169,7 +169,7 @@ def x_of(cm: float) -> float:
 @pytest.mark.parametrize("cm", [20, 30, 120, 300])
 def test_the_cursor_stands_at_the_distance_and_the_two_numbers(cm):
     numbers = replace(NUMBERS, distance=cm / 100, d_l_percent=1.5, d_s_mm=6.0)
-    tree = parsed(figures.plots(curves(), numbers))
+    tree = parsed(plots.plots(curves(), numbers))
     (line,) = [p for p in tree.iter("path") if p.get("stroke") == "var(--fa-ink)"]
     assert float(line.attrib["d"].split()[0].removeprefix("M")) == pytest.approx(x_of(cm), abs=0.06)
     (dot,) = filled(tree, "circle")
@@ -197,7 +197,7 @@ def far_marks(tree: ET.Element) -> dict[str, ET.Element]:
 
 def test_the_far_away_camera_has_marks_of_its_own_beyond_all_distances():
     shown = replace(curves(), orthographic=(1.5, 6.0))
-    tree = parsed(figures.plots(shown, NUMBERS))
+    tree = parsed(plots.plots(shown, NUMBERS))
     marks = far_marks(tree)
     ring, square = marks["circle"].attrib, marks["rect"].attrib
     assert float(ring["cx"]) == plots.FAR > x_of(300) + 10
@@ -207,16 +207,16 @@ def test_the_far_away_camera_has_marks_of_its_own_beyond_all_distances():
     assert say("plot.far") in [text.text for text in tree.iter("text")]
     rows = [[cell.text for cell in row] for row in tree.iter("tr")]
     assert rows[-1] == [say("plot.far"), "1.5", "6.0"]
-    hidden = far_marks(parsed(figures.plots(shown, NUMBERS, hide=("truth",))))
+    hidden = far_marks(parsed(plots.plots(shown, NUMBERS, hide=("truth",))))
     assert set(hidden) == {"circle"}
-    tall = parsed(figures.plots(replace(shown, orthographic=(1.5, 14.0)), NUMBERS))
+    tall = parsed(plots.plots(replace(shown, orthographic=(1.5, 14.0)), NUMBERS))
     assert float(far_marks(tall)["rect"].attrib["y"]) > 128 - 4  # the axis has grown to hold it
 
 
 def test_of_the_far_away_camera_the_cursor_stands_on_its_marks():
     shown = replace(curves(), orthographic=(1.5, 6.0))
     now = replace(NUMBERS, distance=None, d_l_percent=1.5, d_s_mm=6.0)
-    tree = parsed(figures.plots(shown, now))
+    tree = parsed(plots.plots(shown, now))
     (dot,) = filled(tree, "circle")
     ring = far_marks(tree)["circle"]
     assert (dot.attrib["cx"], dot.attrib["cy"]) == (f"{plots.FAR:.1f}", ring.attrib["cy"])
@@ -224,7 +224,7 @@ def test_of_the_far_away_camera_the_cursor_stands_on_its_marks():
 
 def test_curves_pass_through_their_values():
     shown = curves()
-    tree = parsed(figures.plots(shown, NUMBERS))
+    tree = parsed(plots.plots(shown, NUMBERS))
     d_l, d_s = (points(line) for line in tree.iter("polyline"))
     assert np.abs(d_l[:, 0] - [x_of(100 * d) for d in GRID]).max() < 0.06
     assert np.abs(d_s[:, 0] - d_l[:, 0]).max() == 0
@@ -233,7 +233,7 @@ def test_curves_pass_through_their_values():
 
 
 def test_ticks_stand_at_their_distances():
-    tree = parsed(figures.plots(curves(), NUMBERS))
+    tree = parsed(plots.plots(curves(), NUMBERS))
     ticks = {
         t.text or "": float(t.attrib["x"])
         for t in tree.iter("text")
@@ -246,7 +246,7 @@ def test_ticks_stand_at_their_distances():
 
 
 def test_the_band_ends_at_the_tolerance():
-    tree = parsed(figures.plots(curves(), NUMBERS))
+    tree = parsed(plots.plots(curves(), NUMBERS))
     (band,) = [p for p in tree.iter("path") if p.get("fill") == "var(--fa-band)"]
     low, high = re.findall(r"(?:M\S+ |V)([\d.]+)", band.attrib["d"])
     assert float(low) == pytest.approx(94 - 70 * 3 / 6, abs=0.06)
@@ -259,12 +259,12 @@ def test_the_band_ends_at_the_tolerance():
 def test_the_axis_grows_in_steps_of_four(largest, now, top):
     shown = curves(d_s_top=1.0)
     shown = replace(shown, d_s_mm=shown.d_s_mm / shown.d_s_mm.max() * largest)
-    assert figures.d_s_axis(shown, replace(NUMBERS, d_s_mm=now)) == top
+    assert plots.d_s_axis(shown, replace(NUMBERS, d_s_mm=now)) == top
 
 
 def test_values_beyond_an_axis_stay_inside_the_plot():
     shown = replace(curves(), d_l_percent=np.full(49, 50.0))
-    tree = parsed(figures.plots(shown, replace(NUMBERS, d_l_percent=50.0)))
+    tree = parsed(plots.plots(shown, replace(NUMBERS, d_l_percent=50.0)))
     assert points(next(tree.iter("polyline")))[:, 1].min() == 24
 
 
@@ -286,10 +286,10 @@ def label_boxes(tree: ET.Element) -> list[tuple[str, float, float, float, float]
 
 @pytest.mark.parametrize("cm", [20, 30, 77.5, 120, 240, 300])
 def test_no_label_crosses_another_or_leaves_the_plot(cm):
-    assert "height:auto;font-size:11.5px}.fa-plot" in figures.STYLE
-    assert ".fa-plot .t{font-weight:650;font-size:12.5px}" in figures.STYLE
+    assert "height:auto;font-size:11.5px}.fa-plot" in style.STYLE
+    assert ".fa-plot .t{font-weight:650;font-size:12.5px}" in style.STYLE
     # 20 mm: the largest flex, 10 mm, on a face fitted at the worst distance
-    html = figures.plots(curves(cm / 100, 20.0), replace(NUMBERS, distance=cm / 100))
+    html = plots.plots(curves(cm / 100, 20.0), replace(NUMBERS, distance=cm / 100))
     boxes = label_boxes(parsed(html))
     height = float(next(parsed(html).iter("svg")).attrib["viewBox"].split()[3])
     assert any("true" in text for text, *_ in boxes)
@@ -303,16 +303,16 @@ def test_no_label_crosses_another_or_leaves_the_plot(cm):
 
 
 def test_a_photograph_from_beyond_the_slider_has_no_line():
-    html = figures.plots(curves(5.0), NUMBERS)
+    html = plots.plots(curves(5.0), NUMBERS)
     assert "true:" not in text_of(html)
 
 
 @pytest.mark.parametrize("cm", [20, 60, 120, 300])
 def test_no_upright_line_crosses_letters(cm):
     """Words come after the lines, on a rim of what is behind them; curves and marks after the words."""
-    assert ".fa-plot text{fill:var(--fa-dim);\nstroke:var(--mantine-color-body);" in figures.STYLE
-    assert "paint-order:stroke}\n.fa-plot text.b{stroke:var(--fa-band)}" in figures.STYLE
-    (svg,) = parsed(figures.plots(curves(), replace(NUMBERS, distance=cm / 100))).iter("svg")
+    assert ".fa-plot text{fill:var(--fa-dim);\nstroke:var(--mantine-color-body);" in style.STYLE
+    assert "paint-order:stroke}\n.fa-plot text.b{stroke:var(--fa-band)}" in style.STYLE
+    (svg,) = parsed(plots.plots(curves(), replace(NUMBERS, distance=cm / 100))).iter("svg")
     order = list(svg)
     words = [i for i, part in enumerate(order) if part.tag == "text"]
     upright = [

@@ -46,15 +46,15 @@ def likely(curves: Curves, high: float = np.inf, beyond: float = 0.12) -> Curves
 
 
 def test_the_range_that_cannot_be_told_apart_is_where_d_l_is_within_the_tolerance():
-    found = plots.told_apart(v_curves(0.3, 0.75))
+    found = plottable.told_apart(v_curves(0.3, 0.75))
     # The middle lies between two distances of the grid, so the kink is cut: a step is 5.8 %
     assert found == pytest.approx((0.3, 0.75), rel=0.005)
-    words = figures.interval_words(v_curves(0.3, 0.75))
+    words = plottable.interval_words(v_curves(0.3, 0.75))
     assert words.startswith("30 to 75\u202fcm cannot be told apart")
-    whole = plots.told_apart(v_curves(0.01, 60.0))
+    whole = plottable.told_apart(v_curves(0.01, 60.0))
     assert whole == pytest.approx((0.2, 3.0))
-    assert plots.told_apart(replace(v_curves(0.3, 0.75), tolerance_percent=-1.0)) is None
-    assert "No distance" in figures.interval_words(
+    assert plottable.told_apart(replace(v_curves(0.3, 0.75), tolerance_percent=-1.0)) is None
+    assert "No distance" in plottable.interval_words(
         replace(v_curves(0.3, 0.75), tolerance_percent=-1.0)
     )
 
@@ -62,7 +62,7 @@ def test_the_range_that_cannot_be_told_apart_is_where_d_l_is_within_the_toleranc
 @given(st.floats(0.22, 0.6), st.floats(1.3, 4.0))
 def test_the_range_follows_the_crossings(low, ratio):
     high = min(low * ratio, 2.9)
-    found = plots.told_apart(v_curves(low, high))
+    found = plottable.told_apart(v_curves(low, high))
     assert found is not None
     assert found == pytest.approx((low, high), rel=0.02)
 
@@ -70,7 +70,7 @@ def test_the_range_follows_the_crossings(low, ratio):
 def test_a_second_valley_is_not_joined_to_the_best_one():
     d_l = np.where((GRID < 0.3) | ((GRID > 1) & (GRID < 2)), 1.0, 5.0)
     d_l[0] = 0.5
-    found = plots.told_apart(replace(v_curves(0.3, 0.75), d_l_percent=d_l))
+    found = plottable.told_apart(replace(v_curves(0.3, 0.75), d_l_percent=d_l))
     assert found is not None
     assert found[0] == 0.2
     assert 0.28 < found[1] < 0.32
@@ -83,7 +83,7 @@ def x_of(cm: float) -> float:
 
 def test_the_likely_plot_has_its_area_intervals_and_what_lies_beyond():
     curves = likely(v_curves(0.3, 0.75))
-    tree = parsed(figures.plots(curves, NUMBERS))
+    tree = parsed(plots.plots(curves, NUMBERS))
     (area,) = [p for p in tree.iter("path") if p.get("stroke-width") == "1.4"]
     at = np.array(re.findall(r"([\d.]+),([\d.]+)", area.attrib["d"]), dtype=float)
     assert np.abs(at[:, 0] - [x_of(100 * d) for d in GRID]).max() < 0.06
@@ -98,19 +98,19 @@ def test_the_likely_plot_has_its_area_intervals_and_what_lies_beyond():
     assert bars["6"] == pytest.approx([x_of(40), x_of(90)], abs=0.06)
     assert bars["3"] == pytest.approx([x_of(25), x_of(300)], abs=0.06)  # it has no end
     assert len([p for p in tree.iter("path") if "l7 5l-7 5z" in p.attrib["d"]]) == 1
-    text = text_of(figures.plots(curves, NUMBERS))
+    text = text_of(plots.plots(curves, NUMBERS))
     assert "40\u202fcm to 90\u202fcm with a chance of 50\u202f%" in text
     assert "25\u202fcm or more with a chance of 95\u202f%" in text
     assert "12\u202f% of the chance lies beyond 300\u202fcm" in text
-    closed = figures.plots(likely(v_curves(0.3, 0.75), 2.0, 0.0), NUMBERS)
+    closed = plots.plots(likely(v_curves(0.3, 0.75), 2.0, 0.0), NUMBERS)
     assert "l7 5l-7 5z" not in closed
     assert "beyond" not in text_of(closed)
-    assert say("plot.likely") not in text_of(figures.plots(v_curves(0.3, 0.75), NUMBERS))
+    assert say("plot.likely") not in text_of(plots.plots(v_curves(0.3, 0.75), NUMBERS))
 
 
 @pytest.mark.parametrize("cm", [20, 30, 120, 300])
 def test_upright_lines_leave_room_for_the_titles(cm):
-    tree = parsed(figures.plots(likely(v_curves(0.3, 0.75)), replace(NUMBERS, distance=cm / 100)))
+    tree = parsed(plots.plots(likely(v_curves(0.3, 0.75)), replace(NUMBERS, distance=cm / 100)))
     (cursor,) = [p for p in tree.iter("path") if p.get("stroke") == "var(--fa-ink)" and "H" not in p.attrib["d"]
                  and p.get("stroke-width") == "1.6"]  # fmt: skip
     spans = [(float(a), float(b)) for a, b in re.findall(r" (\d+)V(\d+)", cursor.attrib["d"])]
@@ -124,7 +124,7 @@ def test_upright_lines_leave_room_for_the_titles(cm):
 
 def test_the_table_holds_the_curves_and_is_closed():
     curves = likely(v_curves(0.3, 0.75))
-    tree = parsed(figures.plots(curves, NUMBERS))
+    tree = parsed(plots.plots(curves, NUMBERS))
     (details,) = tree.iter("details")
     assert "open" not in details.attrib
     rows = [[cell.text for cell in row] for row in tree.iter("tr")][1:]
@@ -147,7 +147,7 @@ def said(html: str) -> str:
 def test_what_is_hidden_cannot_be_read_anywhere():
     curves = replace(likely(v_curves(0.3, 0.75)), true_distance=0.77)
     everything = {
-        hide: figures.cards(NUMBERS, hide=hide) + figures.plots(curves, NUMBERS, hide=hide)
+        hide: figures.cards(NUMBERS, hide=hide) + plots.plots(curves, NUMBERS, hide=hide)
         + figures.spoken(NUMBERS, hide=hide)
         for hide in (frozenset(), frozenset({"numbers"}), frozenset({"truth"}), frozenset({"actual"}))
     }  # fmt: skip
@@ -168,15 +168,15 @@ def test_what_is_hidden_cannot_be_read_anywhere():
     assert "true: 77" in plain
     assert "true: 77" not in actual
     unknown = replace(curves, true_distance=float("nan"))
-    assert "true:" not in figures.plots(unknown, NUMBERS)
-    assert "nan" not in figures.plots(unknown, NUMBERS)
+    assert "true:" not in plots.plots(unknown, NUMBERS)
+    assert "nan" not in plots.plots(unknown, NUMBERS)
 
 
 def test_a_difference_to_another_fit_is_called_that():
     numbers = replace(NUMBERS, reference="the 60 cm fit")
     assert "Difference to the 60 cm fit" in figures.cards(numbers)
     assert "true face" not in figures.cards(numbers).replace(say("number.d_s_to_note"), "")
-    assert "Difference to the 60 cm fit" in figures.plots(v_curves(0.3, 0.75), numbers)
+    assert "Difference to the 60 cm fit" in plots.plots(v_curves(0.3, 0.75), numbers)
 
 
 def own(**fields: object) -> Photo:
@@ -185,7 +185,7 @@ def own(**fields: object) -> Photo:
 
 def test_points_that_can_be_moved_are_buttons_with_names_and_places():
     shown = own()
-    html = figures.photo_marks(shown, draggable=True)
+    html = photograph.photo_marks(shown, draggable=True)
     tree = parsed(html)
     (box,) = [e for e in tree.iter() if "data-fa-photo" in e.attrib]
     assert box.attrib["data-fa-photo"] == "800x600"
@@ -204,23 +204,23 @@ def test_points_that_can_be_moved_are_buttons_with_names_and_places():
         assert start == pytest.approx((x, y), abs=0.06)
     assert next(tree.iter("svg")).attrib["role"] == "group"  # an image would hide its buttons
     assert "#fx" not in html  # each cross is in its group, so that it moves with it
-    assert "stroke-width:24px" in figures.STYLE
-    assert "data-fa-photo" not in figures.photo_marks(shown)
+    assert "stroke-width:24px" in style.STYLE
+    assert "data-fa-photo" not in photograph.photo_marks(shown)
 
 
 def test_crosses_in_an_element_of_their_own_are_the_same_crosses():
     shown = egg()
-    whole = parsed(figures.photo_marks(shown))
-    apart = parsed(figures.photo_crosses(shown))
-    marks = figures.photo_marks(shown, crosses=False, hover=False)
+    whole = parsed(photograph.photo_marks(shown))
+    apart = parsed(photograph.photo_crosses(shown))
+    marks = photograph.photo_marks(shown, crosses=False, hover=False)
     paths = [{p.get("id"): p.attrib["d"] for p in tree.iter("path")} for tree in (whole, apart)]
     assert paths[0]["fx"] == paths[1]["fx"]
     assert 'id="fx"' not in marks
     assert marks.count('href="#fx"') == 2  # halo and stroke
-    assert len(marks) < 0.5 * len(figures.photo_marks(shown))
+    assert len(marks) < 0.5 * len(photograph.photo_marks(shown))
     hidden = replace(shown, points_shown=False)
-    assert "fx" not in figures.photo_crosses(hidden)
-    assert "href" not in figures.photo_marks(hidden)
+    assert "fx" not in photograph.photo_crosses(hidden)
+    assert "href" not in photograph.photo_marks(hidden)
 
 
 def test_the_pointer_reads_a_points_name_and_its_gap_at_the_face():
@@ -232,7 +232,7 @@ def test_the_pointer_reads_a_points_name_and_its_gap_at_the_face():
     known = np.isfinite(shown.observed[:, 0])
     assert gaps[known] == pytest.approx(2e3 * shown.vertices[at, 2][known] / shown.focal)
     assert np.isnan(gaps[~known]).all()
-    titles = [t.text for t in parsed(figures.photo_marks(shown, landmarks=at)).iter("title")]
+    titles = [t.text for t in parsed(photograph.photo_marks(shown, landmarks=at)).iter("title")]
     assert len(titles) == known.sum()
     first = np.flatnonzero(known)[0]
     assert titles[0] == f"{shown.names[first]}: {gaps[first]:.1f}\u202fmm at the face"
@@ -240,33 +240,33 @@ def test_the_pointer_reads_a_points_name_and_its_gap_at_the_face():
 
 def test_error_lines_are_as_long_as_asked():
     shown = replace(egg(), error_scale=10.0)
-    tree = parsed(figures.photo_marks(shown))
+    tree = parsed(photograph.photo_marks(shown))
     (lines,) = [p for p in tree.iter("path") if p.get("id") == "fe"]
     ends = np.array(re.findall(r"M(\S+) (\S+?)L(\S+) ([\d.]+)", lines.attrib["d"]), dtype=float)
     known = np.isfinite(shown.observed[:, 0])
     assert len(ends) == known.sum()
     assert np.abs(ends[:, :2] - shown.observed[known]).max() < 0.06
     assert np.abs(ends[:, 2:] - ends[:, :2] - (20.0, 0.0)).max() < 0.11
-    assert 'id="fe"' not in figures.photo_marks(egg())
+    assert 'id="fe"' not in photograph.photo_marks(egg())
 
 
 def test_an_outline_is_drawn_in_its_pieces():
     nothing = [np.nan, np.nan]
     outline = np.array([[1.0, 2.0], [3.0, 4.0], nothing, nothing, [5.0, 6.0], [7.0, 8.0]])
-    tree = parsed(figures.photo_marks(replace(egg(), outline=outline)))
+    tree = parsed(photograph.photo_marks(replace(egg(), outline=outline)))
     (path,) = [p for p in tree.iter("path") if p.get("id") == "fl"]
     assert path.attrib["d"] == "M1.0 2.0L3.0 4.0M5.0 6.0L7.0 8.0"
 
 
 def test_names_stand_beside_their_points():
     shown = replace(egg(), names_shown=True, names=tuple(f"p{i}" for i in range(len(egg().names))))
-    words = {t.text for t in parsed(figures.photo_marks(shown)).iter("text")}
+    words = {t.text for t in parsed(photograph.photo_marks(shown)).iter("text")}
     known = np.flatnonzero(np.isfinite(shown.observed[:, 0]))
     assert words == {f"p{i}" for i in known}
 
 
 def test_the_photograph_is_told_in_words():
-    label = next(parsed(figures.photo_marks(egg())).iter("svg")).attrib["aria-label"]
+    label = next(parsed(photograph.photo_marks(egg())).iter("svg")).attrib["aria-label"]
     assert "taken from 30 cm" in label
     assert f"{int(np.isfinite(egg().observed[:, 0]).sum())} points" in label
     assert "mm" in label
@@ -325,7 +325,7 @@ def test_the_view_of_the_heads_is_told_in_words():
 
 @pytest.mark.parametrize(("asked", "put"), [(0.2, "1"), (1.5, "1.5"), (9, "2")])
 def test_the_size_of_text_is_kept_in_its_range(asked, put):
-    assert f"--fa-scale:{put}}}" in figures.text_size(asked)
+    assert f"--fa-scale:{put}}}" in style.text_size(asked)
     assert "var(--fa-scale,1)" in style.STYLE
 
 

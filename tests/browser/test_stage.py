@@ -14,7 +14,7 @@ from playwright.sync_api import Page
 
 from faceambig.scene import Lines, Marks, Scene
 from faceambig_app import guard
-from faceambig_app.markup import figures
+from faceambig_app.markup import photograph, style
 from faceambig_app.script import Script
 from faceambig_app.stage import FAR, FIRST_FOV, FIRST_POSITION, NEAR, Stage
 from scenes import FRONT, head, photo, scene, strip
@@ -75,7 +75,7 @@ def show(page_url: Callable[..., Page]) -> Iterator[Show]:
         if came:
             break
         tab.wait_for_timeout(50)
-    came[0].gui.add_html(figures.STYLE)
+    came[0].gui.add_html(style.STYLE)
     came[0].gui.main_panel.minimize()
     yield Show(tab, came[0])
     server.stop()
@@ -130,7 +130,7 @@ def test_a_hand_that_turns_the_viewer_is_told(show):
 
 
 def test_a_point_that_can_be_moved_has_24_pixels_to_hit(show):
-    html = figures.STYLE + figures.photo_marks(photo(), draggable=True)
+    html = style.STYLE + photograph.photo_marks(photo(), draggable=True)
     show.tab.evaluate(
         """html => { document.getElementById("own")?.remove(); const e = document.createElement("div");
         e.id = "own"; e.style = "position:fixed;z-index:99999;left:0;top:0;width:180px"; e.innerHTML = html;

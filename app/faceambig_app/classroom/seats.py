@@ -30,9 +30,8 @@ class Classroom:
         self.state: ViewState | None = None  # of who leads, or led last; None: nobody has
         self.revealed: set[Place] = set()
         self.note = ""  # that all may read
-        self.private = (
-            False  # whether who leads shows a photograph of their own, which stays theirs
-        )
+        # Whether who leads shows a photograph of their own, which stays theirs
+        self.private = False
         self.leader: Seat | None = None
         self._lessons = lessons
         self._seats: dict[Seat, None] = {}  # used as a set that keeps order

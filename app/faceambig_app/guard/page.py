@@ -66,9 +66,8 @@ PATCHES = ((_SENDER, _OUR_SENDER), (_CANVAS, _OUR_CANVAS), (_DARK, _OUR_DARK))
 _PACKED = re.compile(
     r'<script data-p="([^"]*)" data-ss="(\d+)" data-cs="(\d+)">(.*?)</script>', re.DOTALL
 )
-_UNPACKED = (
-    "const code=td.decode(heap.subarray(up+ss,up+sz));"  # in the loader, which unpacks the bundle
-)
+# In the loader, which unpacks the bundle
+_UNPACKED = "const code=td.decode(heap.subarray(up+ss,up+sz));"
 # viser's packing: zstd in base 88, five characters for four bytes.
 _DIGITS = "".join(chr(c) for c in range(0x21, 0x7F) if chr(c) not in "\"&'<>`")
 

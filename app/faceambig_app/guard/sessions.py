@@ -31,9 +31,8 @@ class Limits:
     sessions: int = 64  # browsers at a time
     # Seconds until a browser shows its camera. A phone that compiles shaders for longer comes back when it is done
     first: float = 10.0
-    idle: float = (
-        3600.0  # seconds without a word; the page comes back by itself when it is looked at
-    )
+    # Seconds without a word; the page comes back by itself when it is looked at
+    idle: float = 3600.0
     rate: float = 120.0  # messages a second that are read; more wait in the sender's own machine
     burst: float = 240.0  # messages that may come at once
     hurry: float = 10.0  # seconds at full speed, which no hand keeps up: what it sends would be read long after it left

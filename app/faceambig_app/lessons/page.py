@@ -12,7 +12,7 @@ from ..state import ViewState, changed
 from ..state.fields import LANGUAGES
 from ..state.link import query
 from ..text import NARROW, language, say
-from .reading import Lesson, Step
+from .lesson import Lesson, Step
 
 ADDRESS = "http://127.0.0.1:8080/"  # of `faceambig serve`, in links of the teacher's sheet
 

@@ -1,35 +1,23 @@
-"""Lessons: Markdown files with front matter that a teacher can write. assets/lessons/README.md tells how.
-
-A file that is wrong is named with its line, and the others work.
-"""
+"""Reading a lesson: a Markdown file with front matter that a teacher can write. assets/lessons/README.md tells how."""
 
 from __future__ import annotations
 
-import json
-import logging
 import re
 import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn
 
-from faceambig.errors import AssetError
-from faceambig.io import asset_path
 from faceambig.io.files import text_of
 
 from ..state import DEFAULT, ViewState, changed, link
 from ..state.fields import LAST_LESSON, LAST_STEP
-from ..text import speaking
 from . import measures
-from .conditions import Condition, condition
-
-log = logging.getLogger("faceambig")
+from .conditions import condition
+from .lesson import Ask, Lesson, Number, Step, Task
 
 FENCE, TOLD_AFTER = "+++", "---"
-FILE = re.compile(r"(\d\d)-[a-z0-9-]+\.md")
-NUMBERS = "numbers.json"  # what tools/lessons.py has computed
 PLACEHOLDER = re.compile(r"\{\{(.*?)\}\}")
 MOST_BYTES = 200_000  # of a lesson
 MOST_CHOICES = 5
@@ -42,111 +30,6 @@ _STEP: Mapping[str, type] = {
     "title": str, "link": str, "ask": str, "choices": list, "number": dict, "answer": str, "do": list, "tools": list,
 }  # fmt: skip
 _NUMBER: Mapping[str, type] = {"low": int, "high": int, "unit": str}
-
-
-@dataclass(frozen=True, slots=True)
-class Number:
-    """What is asked for is a whole number of a unit."""
-
-    low: int
-    high: int
-    unit: str
-
-
-@dataclass(frozen=True, slots=True)
-class Ask:
-    """A prediction: a question, and either choices or a number."""
-
-    question: str
-    choices: tuple[str, ...]
-    number: Number | None
-    answer: str  # for the teacher
-
-
-@dataclass(frozen=True, slots=True)
-class Task:
-    """Something the learner does: it is ticked when its condition has held once."""
-
-    words: str
-    when: Condition
-
-
-@dataclass(frozen=True, slots=True)
-class Step:
-    """One step of a lesson. Texts are Markdown, numbers filled in."""
-
-    title: str
-    state: ViewState
-    ask: Ask | None
-    tasks: tuple[Task, ...]
-    tools: tuple[str, ...]  # controls that stand beside the text
-    text: str
-    answered: str  # told when the question is answered
-    done: str  # told when all tasks are ticked
-
-
-@dataclass(frozen=True, slots=True)
-class Lesson:
-    """A lesson and what its teacher should know (Markdown)."""
-
-    number: int
-    name: str  # of its file, without ending
-    title: str
-    goal: str
-    minutes: int
-    steps: tuple[Step, ...]
-    teacher: str
-
-
-@dataclass(frozen=True, slots=True)
-class Lessons:
-    """All that could be read, by number; and a line for each file that could not."""
-
-    by_number: Mapping[int, Lesson]
-    problems: tuple[str, ...] = ()
-
-    def step(self, state: ViewState) -> Step | None:
-        """The step that a state is in; a number beyond the last is the last."""
-        lesson = self.by_number.get(state.lesson or 0)
-        return None if lesson is None else lesson.steps[min(state.step, len(lesson.steps)) - 1]
-
-
-@lru_cache(maxsize=4)
-def lessons(language: str = "en") -> Lessons:
-    """The lessons of a language, with the numbers that tools/lessons.py has computed; problems are logged."""
-    folder = asset_path(f"lessons/{language}")
-    with speaking(language):  # the numbers in them
-        found = read_lessons(folder, stored(folder.parent / NUMBERS))
-    for problem in found.problems:
-        log.warning("a lesson is left out: %s", problem)
-    return found
-
-
-def stored(path: Path) -> dict[str, float]:
-    """Numbers computed before, by expression; none where there is no such file."""
-    return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
-
-
-def read_lessons(folder: Path, numbers: Mapping[str, float]) -> Lessons:
-    """The lessons of a folder. A number that is not in `numbers` is computed, which takes up to some seconds."""
-    found: dict[int, Lesson] = {}
-    problems: list[str] = []
-    for path in sorted(folder.glob("*.md")):
-        named = FILE.fullmatch(path.name)
-        if named is None:
-            if path.name != "README.md":
-                problems.append(f"{path.name}: is not named like 06-my-lesson.md")
-            continue
-        try:
-            lesson = read_lesson(path, numbers)
-            if lesson.number in found:
-                raise ValueError(
-                    f"{path.name}: lesson {lesson.number} is {found[lesson.number].name}.md already"
-                )
-            found[lesson.number] = lesson
-        except (ValueError, AssetError) as error:
-            problems.append(str(error))
-    return Lessons(found, tuple(problems))
 
 
 def read_lesson(path: Path, numbers: Mapping[str, float]) -> Lesson:

@@ -12,8 +12,9 @@ from ..panel import Change
 from ..panel.lessons import Shown
 from ..state import DEFAULT, ViewState, changed, for_eyes_of
 from ..text import say
+from .lesson import Ask, Step
 from .page import step_html, teacher_html
-from .reading import Ask, Lessons, Step
+from .shelf import Lessons
 
 Place = tuple[int, int]  # lesson and step
 

@@ -15,14 +15,6 @@ from faceambig.arrays import Array
 from faceambig.scene import Legend, Numbers, Scene
 
 from ..text import NARROW, distance_text, numeral, percent_number, say
-from .photograph import photo_crosses as photo_crosses
-from .photograph import photo_marks as photo_marks
-from .photograph import photo_picture as photo_picture
-from .plots import d_s_axis as d_s_axis
-from .plots import interval_words as interval_words
-from .plots import plots as plots
-from .style import STYLE as STYLE
-from .style import text_size as text_size
 
 
 def hidden_boxes(uuids: Iterable[str]) -> str:

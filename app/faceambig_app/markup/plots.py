@@ -1,13 +1,12 @@
 """The curves of the page as SVG: d_L, d_S and how likely each distance is, over one axis with one cursor.
 
-Colours are CSS variables of style.STYLE. The same numbers stand in a table (plottable.py) that is folded away.
+Colours are CSS variables of style.STYLE. Words and a table of the same numbers are in plottable.py.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable
-from functools import lru_cache
 from html import escape
 from typing import NamedTuple
 
@@ -16,8 +15,8 @@ import numpy as np
 from faceambig.arrays import Array
 from faceambig.scene import Curves, Numbers
 
-from ..text import NARROW, centimetres, each_language, numeral, percent_number, say
-from .plottable import table
+from ..text import NARROW, centimetres, each_language, numeral, say
+from .plottable import KEPT, in_words, interval_words, likely_words, ranges, table
 
 WIDTH, LEFT, RIGHT = 340, 34, 290  # in SVG units; the distances end at RIGHT
 FAR, END = 322, 332  # of the far-away camera, which stands beyond all distances; of bands and grid
@@ -29,7 +28,6 @@ LIKELY_TOP, LIKELY_BOTTOM = 256, 300
 BARS_AT = (324, 310)  # of the middle halves and the 95 %, below the density
 D_L_MAX = 6.0  # percent
 AUTOMATIC_PERCENT = 5.0  # the gap of points that a program finds
-KEPT = 64  # curves whose unmoving part is kept: a class drags over one photograph each
 
 
 def plots(
@@ -43,7 +41,7 @@ def plots(
     told = "numbers" not in hide
     true = told and "truth" not in hide
     top = d_s_axis(curves, numbers)
-    words = escape(_alternative(curves, numbers) if true else say("plot.alt_hidden"))
+    words = escape(in_words(curves, numbers) if true else say("plot.alt_hidden"))
     below, above = _still(curves, numbers.reference, top, told, true, "actual" not in hide)
     x = float(FAR) if numbers.distance is None else _across(numbers.distance)
     cursor = (
@@ -100,90 +98,10 @@ def _said(curves: Curves, true: bool, with_table: bool) -> str:
     return said + (table(curves, true) if with_table else "")
 
 
-@lru_cache(maxsize=KEPT)
-def _ranges(curves: Curves) -> tuple[float, float, float, float]:
-    """Least and largest d_L in percent and d_S in millimetres."""
-    d_l, d_s = curves.d_l_percent, curves.d_s_mm
-    return float(d_l.min()), float(d_l.max()), float(d_s.min()), float(d_s.max())
-
-
 def d_s_axis(curves: Curves, numbers: Numbers) -> float:
     """End of the d_S axis: 12 mm, growing in steps of 4."""
-    largest = max(_ranges(curves)[3], curves.orthographic[1], numbers.d_s_mm)
+    largest = max(ranges(curves)[3], curves.orthographic[1], numbers.d_s_mm)
     return 4.0 * max(3, math.ceil(largest / 4.0))
-
-
-def told_apart(curves: Curves) -> tuple[float, float] | None:
-    """The range of distances around the best whose d_L a person accepts, metres; None if there is none.
-
-    Between two distances of the sweep the curve is taken as straight over the logarithm.
-    """
-    over = curves.d_l_percent - curves.tolerance_percent
-    best = int(np.argmin(over))
-    if over[best] > 0:
-        return None
-    return _crossing(curves.distances, over, best, -1), _crossing(curves.distances, over, best, 1)
-
-
-def _crossing(distances: Array, over: Array, start: int, step: int) -> float:
-    """Where `over` first rises above 0 on the way from `start`; the end of the sweep if it does not."""
-    at = start
-    while 0 <= at + step < len(over):
-        if over[at + step] > 0:
-            share = -over[at] / (over[at + step] - over[at])
-            return float(distances[at] * (distances[at + step] / distances[at]) ** share)
-        at += step
-    return float(distances[at])
-
-
-def interval_words(curves: Curves) -> str:
-    """Which distances cannot be told apart, as a sentence."""
-    found = told_apart(curves)
-    percent = f"{curves.tolerance_percent:g}{NARROW}%"
-    if found is None:
-        return say("plot.none", tolerance=percent)
-    return say(
-        "plot.interval",
-        low=f"{100 * found[0]:.0f}",
-        high=centimetres(_rounded(found[1])),
-        tolerance=percent,
-    )
-
-
-def nothing_likely() -> str:
-    """Why there is no plot of how likely each distance is."""
-    return f'<div class="fa"><p><small>{escape(say("plot.likely_none"))}</small></p></div>'
-
-
-def likely_words(curves: Curves) -> str:
-    """The intervals of the posterior and what lies beyond the axis, as sentences."""
-    words = [say("plot.likely_lead")]
-    for share, (low, high) in zip((50, 95), curves.intervals, strict=False):
-        near = centimetres(_rounded(low))
-        if np.isinf(high):
-            words.append(say("plot.likely_open", share=share, low=near))
-        else:
-            far = centimetres(_rounded(high))
-            words.append(say("plot.likely_range", share=share, low=near, high=far))
-    if curves.beyond >= 0.005:
-        end = centimetres(float(curves.distances[-1]))
-        words.append(say("plot.beyond", share=f"{100 * curves.beyond:.0f}{NARROW}%", end=end))
-    return " ".join(words)
-
-
-def _rounded(metres: float) -> float:
-    """To whole centimetres, as the words say "about"."""
-    return round(100 * metres) / 100
-
-
-def _alternative(curves: Curves, numbers: Numbers) -> str:
-    least_l, most_l, least_s, most_s = _ranges(curves)
-    return say(
-        "plot.alt",
-        d_l=f"{percent_number(least_l)} - {percent_number(most_l)}{NARROW}%",
-        d_s=numeral(f"{least_s:.1f} - {most_s:.1f}{NARROW}mm"),
-        now=centimetres(numbers.distance),
-    )
 
 
 class Plot(NamedTuple):

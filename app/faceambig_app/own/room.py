@@ -38,9 +38,8 @@ class OwnRoom:
         self._dragged: int | None = None  # the point that a hand holds
         self._job = 0  # counts what was asked for: what comes late is not wanted any more
         self._todo: tuple[int, Make, Callable[[OwnPhoto], None]] | None = None
-        self._busy: asyncio.Task[None] | None = (
-            None  # a thread works; it holds what it was given until it ends
-        )
+        # A thread works; it holds what it was given until it ends
+        self._busy: asyncio.Task[None] | None = None
 
     @property
     def can_undo(self) -> bool:

@@ -122,9 +122,8 @@ class HeadNodes:
         self._depth = 0.0  # metres, of the words before the viewer who stands at the root
         self._wanted: Board | None = Board(head.title, 0.0, (), 0.0)  # no scene's
         self._said: object = None  # the words there are: (board, pixels of room)
-        self._placed: object = (
-            None  # what the nodes stand for: viser compares every vector anew, at 50 us each
-        )
+        # What the nodes stand for: viser compares every vector anew, at 50 us each
+        self._placed: object = None
 
     def fits(self, head: Head) -> bool:
         """Whether these meshes have the triangles of `head`; else new ones are needed."""

@@ -80,9 +80,8 @@ class ViewState(
 
     v: int = VERSION
     model: str = "embedded"
-    subject: int | str = (
-        2  # of the ten, the face that shows the effect best: d_S 1.0 mm at 30 cm, 4.1 mm at 120 cm
-    )
+    # Of the ten, the face that shows the effect best: d_S 1.0 mm at 30 cm, 4.1 mm at 120 cm
+    subject: int | str = 2
     actual: float = 0.3  # metres, where the photo was taken from
     distance: float = 1.2  # metres, assumed by the fit
     camera: str = "perspective"
