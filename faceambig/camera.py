@@ -62,9 +62,8 @@ class Seen(NamedTuple):
     q: Array  # (N, 3) R v, metres, camera axes, from the model's origin
     z: Array  # (N,) s / (1 + kappa q_z), pixels per metre at the point
     xy: Array  # (N, 2) pixels from the principal point
-    behind: (
-        Array | None
-    )  # () or (F,) True: a point is behind the camera and z, xy mean nothing; None: nowhere
+    # () or (F,) True: a point is behind the camera and z, xy mean nothing; None: nowhere
+    behind: Array | None
 
 
 def see(view: View, points: Array) -> Seen:

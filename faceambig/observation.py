@@ -21,10 +21,11 @@ LARGEST_PX = 1e9  # pixels from 0: far beyond every picture, and squares of it a
 # Pixels from end to end of the points: coordinates in units of a picture are far above
 SMALLEST_PX = 1e-6
 HEAVIEST = 1e9  # ratio of the largest weight to 1 and of 1 to the smallest
+# Metres, of the camera that took the photograph; nearer, the nose leaves the lens's view
 DISTANCES = (
     0.2,
     5.0,
-)  # metres, of the camera that took the photograph; nearer, the nose leaves the lens's view
+)
 LARGEST_EYES_PX = 1e6
 DENSE = ("all", "visible")  # `scheme` of observe: vertices of the surface instead of landmarks
 # Synthetic photographs: frontal distance of the eye centres in a picture of 500 x 500
@@ -226,9 +227,8 @@ def observe(
         raise ValueError(f"seed: {shown(seed)} is negative")
     dense = isinstance(face, Subject) and isinstance(scheme, str) and scheme in DENSE
     if dense and scheme not in face.model.schemes:
-        named = next(
-            iter(face.model.schemes), "ibug68"
-        )  # whose eyes give zoom and noise their unit
+        # Whose eyes give zoom and noise their unit
+        named = next(iter(face.model.schemes), "ibug68")
     else:
         dense, named = False, scheme
     camera = portrait_camera(

@@ -15,9 +15,9 @@ import numpy as np
 
 from .arrays import Array, checked
 
-R0 = np.diag(
-    [1.0, -1.0, -1.0]
-)  # frontal: model y up, z out of the face -> camera y down, z forward
+# Frontal: model y up, z out of the face -> camera y down, z forward
+R0 = np.diag([1.0, -1.0, -1.0])
+# [e_i]x, index i first
 GENERATORS = np.array(
     [
         [[0, 0, 0], [0, 0, -1], [0, 1, 0]],
@@ -25,7 +25,7 @@ GENERATORS = np.array(
         [[0, -1, 0], [1, 0, 0], [0, 0, 0]],
     ],
     dtype=np.float64,
-)  # [e_i]x, index i first
+)
 
 
 def cross_matrix(r: Array) -> Array:

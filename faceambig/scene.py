@@ -28,9 +28,8 @@ class Head:
     # False: colours are values of a legend and are shown as they are, shading reduced
     lit: bool = True
     slot: float = 0.0  # metres along the viewer's right
-    caption: tuple[
-        tuple[str, str], ...
-    ] = ()  # lines under the head: (text, tone), tone "dim", "d_l" or "d_s"
+    # Lines under the head: (text, tone), tone "dim", "d_l" or "d_s"
+    caption: tuple[tuple[str, str], ...] = ()
     # Over the first vertices: the mesh while a hand moves
     coarse_faces: NDArray[np.uint32] | None = None
     values_mm: Array | None = None  # (V,) what colours of a legend mean; NaN: not measured
@@ -157,16 +156,15 @@ class Scene:
     blink: bool = False  # heads of one slot are shown in turn, one at a time, a second each
     marks: tuple[Marks, ...] = ()
     lines: tuple[Lines, ...] = ()
+    # Metres, model axes: where heads are centred and turn about
     pivot: tuple[float, float, float] = (
         0.0,
         0.0,
         0.0,
-    )  # metres, model axes: where heads are centred and turn about
+    )
     scale_bar: float = 0.05  # metres; 0: none
     note: str = ""  # one line: model, subject, what is grey
-    hide: frozenset[str] = (
-        frozenset()
-    )  # what is not told: "numbers" (their text), "truth" (d_S and its curve), "actual"
-    landmarks: IntArray = field(
-        default_factory=lambda: np.zeros(0, dtype=np.intp)
-    )  # (L,) vertices marked on heads
+    # What is not told: "numbers" (their text), "truth" (d_S and its curve), "actual"
+    hide: frozenset[str] = frozenset()
+    # (L,) vertices marked on heads
+    landmarks: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.intp))

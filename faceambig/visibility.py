@@ -14,9 +14,8 @@ from .arrays import Array, IntArray
 from .camera import Camera, Seen, see
 
 MARGIN = 2e-3  # metres; what lies less behind a triangle is seen, or the outline's own facets would hide it
-MOST_CELLS = (
-    1 << 18
-)  # of the grid: a few vertices beside a camera that is too near spread over any number
+# Of the grid: a few vertices beside a camera that is too near spread over any number
+MOST_CELLS = 1 << 18
 
 
 def visible_vertices(

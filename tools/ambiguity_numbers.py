@@ -58,9 +58,8 @@ class Modes:
     distance: float | None  # metres; None: orthographic
     words: str
     limit: float  # largest |alpha| of a plausible face
-    faces: tuple[
-        Bent, ...
-    ]  # -10 mm, the lower end of the plausible range, the fit, the upper end, +10 mm
+    # -10 mm, the lower end of the plausible range, the fit, the upper end, +10 mm
+    faces: tuple[Bent, ...]
 
 
 @cache

@@ -214,9 +214,8 @@ class Browser:
     def _go(self, state: ViewState) -> None:
         before = self.room.state
         if state.draw is not None and state.fitting != before.fitting and state.draw == before.draw:
-            state = changed(
-                state, draw=None
-            )  # a drawn face has a distance of its own: the fit moves
+            # A drawn face has a distance of its own: the fit moves
+            state = changed(state, draw=None)
         self._travel(history.change(self._history, state, time.monotonic()))
 
     def _travel(self, to: history.History, *, own: bool = True) -> None:

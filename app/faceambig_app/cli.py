@@ -26,9 +26,8 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """One line on stderr, exit status 2."""
-        short = (
-            message if len(message) <= 300 else f"{message[:297]}..."
-        )  # argparse repeats all of a value
+        # argparse repeats all of a value
+        short = message if len(message) <= 300 else f"{message[:297]}..."
         self.exit(BAD_INPUT, f"{self.prog}: {short}\n")
 
 

@@ -72,9 +72,8 @@ def words(finding: Finding) -> str:
 
 def cause(error: BaseException) -> str:
     """Why something failed, as a short sentence of one line: an error's own words, or what it is called."""
-    told = getattr(error, "strerror", None) or str(
-        error
-    )  # of a file the cause, not where on this machine it lies
+    # Of a file the cause, not where on this machine it lies
+    told = getattr(error, "strerror", None) or str(error)
     line = " ".join("".join(c if c.isprintable() else " " for c in str(told)).split())[
         :LONGEST_CAUSE
     ]

@@ -24,9 +24,8 @@ _QUERY = re.compile(r"[A-Za-z0-9._,:;=&~*+%-]*")  # what no browser writes other
 class Hello(Struct, frozen=True):
     """The first report of every connection: the address holds the state after a reconnection or a restart."""
 
-    query: Annotated[
-        str, Meta(max_length=LONGEST)
-    ]  # of the address, without "?", as it stands there
+    # Of the address, without "?", as it stands there
+    query: Annotated[str, Meta(max_length=LONGEST)]
     reduced_motion: bool
     touch: bool
     dark: bool  # the system's preference

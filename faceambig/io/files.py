@@ -16,9 +16,8 @@ from ..errors import AssetError
 
 # Of all arrays of a model as float64; the largest public one, 53,490 vertices and 199 modes, needs 255 MB
 MAX_BYTES = 1 << 29
-MAX_TEXT_BYTES = (
-    1 << 20
-)  # 68 points take 2 kB, a dense scheme 200 kB, a face mesh with all its words 300 kB
+# 68 points take 2 kB, a dense scheme 200 kB, a face mesh with all its words 300 kB
+MAX_TEXT_BYTES = 1 << 20
 
 
 def asset_path(name: str) -> Path:

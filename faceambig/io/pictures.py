@@ -38,9 +38,8 @@ STARTS = (b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n", b"BM", b"II*\x00", b"MM\x00*", 
 ORIENTATION, EXIF_FOLDER, FOCAL_35MM = 0x0112, 0x8769, 0xA405
 SIDEWAYS = (5, 6, 7, 8)  # orientations whose width and height change places
 FOCAL_RANGE = (5.0, 3000.0)  # mm in 35 mm terms; 0 is EXIF's "unknown"
-DIAGONAL_35MM = math.hypot(
-    36.0, 24.0
-)  # mm: equivalent focal lengths compare diagonals (CIPA DCG-001)
+# Millimetres: equivalent focal lengths compare diagonals (CIPA DCG-001)
+DIAGONAL_35MM = math.hypot(36.0, 24.0)
 DAMAGED = (
     OSError,
     SyntaxError,

@@ -16,9 +16,8 @@ from ..arrays import Array
 
 Picture = NDArray[np.uint8]
 Colour = tuple[int, int, int]  # sRGB
-Place = Callable[
-    [Array], NDArray[np.int32]
-]  # positions in pixels -> what OpenCV wants, 4 bits of fraction
+# Positions in pixels -> what OpenCV wants, 4 bits of fraction
+Place = Callable[[Array], NDArray[np.int32]]
 THIN = "\u2009"  # thin space: the font has no narrow no-break space
 FINE = 4  # times larger than a pixel: where strokes are drawn
 

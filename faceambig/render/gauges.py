@@ -11,10 +11,11 @@ from .plots import DIM, INK
 from .sheet import CARD, OBSERVED, PROJECTED, TONES, Sheet
 
 CARD_HEIGHT = 122  # units
+# Units: the first line of warnings below the cards, and each further one
 WARNING, WARNING_STEP = (
     26.0,
     19.0,
-)  # units: the first line of warnings below the cards, and each further one
+)
 
 
 def under(sheet: Sheet, heads: Sequence[Head]) -> tuple[tuple[str, str], ...]:

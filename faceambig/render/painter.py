@@ -18,10 +18,11 @@ from ..scene import Photo
 
 SAMPLES = 2  # per pixel and axis
 NEAREST = 1e-3  # metres: triangles that reach behind the camera are left out
+# sRGB at the top and at the bottom, CBD5E0 between
 BACKGROUND = (
     (0.835, 0.867, 0.902),
     (0.757, 0.800, 0.851),
-)  # sRGB at the top and at the bottom, CBD5E0 between
+)
 INSIDE = 0.42  # sRGB grey of back faces: a cut surface, never a look into the empty head
 
 # Direction towards the light in camera axes with y up (x right, z to the camera), linear colour. Key from above left.
@@ -101,9 +102,8 @@ def shade(
     half /= np.linalg.norm(half, axis=1, keepdims=True)
     sheen = SHEEN * np.clip(np.einsum("vk,vk->v", normals, half), 0.0, None) ** 18
     linear = (colours / 255.0) ** 2.2
-    sheen *= np.clip(
-        linear.mean(axis=1) / 0.06, 0.0, 1.0
-    )  # pupils and brows do not shine as skin does
+    # Pupils and brows do not shine as skin does
+    sheen *= np.clip(linear.mean(axis=1) / 0.06, 0.0, 1.0)
     if occlusion is not None:
         open_ = occlusion[:, None] / 255.0
         # Light that reaches a fold has met skin before: it loses blue and green first: folds are warm, not grey.

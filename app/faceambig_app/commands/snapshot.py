@@ -36,9 +36,8 @@ def help_of(field: Field, also: str = "") -> str:
     told = " ".join(filter(None, (within, field.unit))) or ", ".join(map(str, field.choices))
     default = text_of(field, getattr(DEFAULT, field.name))
     ranged = f" [{told}]" if told else ""
-    return f"{field.help}{also}{ranged} (default {default})".replace(
-        "%", "%%"
-    )  # argparse fills in %
+    # argparse fills in %
+    return f"{field.help}{also}{ranged} (default {default})".replace("%", "%%")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -23,10 +23,11 @@ from ..state import FIELDS, ViewState, changed
 from ..text import NARROW, centimetres, movement, numeral, say
 
 MODES = 3  # flexibility modes on offer: A, B, C
+# Of mean surface change to either side, if nothing is asked, and the most
 SWING_MM, MOST_MM = (
     5.0,
     10.0,
-)  # of mean surface change to either side, if nothing is asked, and the most
+)
 LETTERS = ascii_uppercase[:MODES]
 NEAREST, FARTHEST = FIELDS["distance"].low, FIELDS["distance"].high  # metres
 

@@ -36,9 +36,8 @@ class OwnFrame:
     """What one browser shows of its own photograph."""
 
     scene: Scene
-    sliders: tuple[
-        tuple[str, tuple[tuple[float, str], ...]], ...
-    ] = ()  # label, marks: of the modes
+    # Label, marks: of the modes
+    sliders: tuple[tuple[str, tuple[tuple[float, str], ...]], ...] = ()
 
 
 def own_frame(own: OwnPhoto | None, state: ViewState, draft: bool) -> OwnFrame:

@@ -56,9 +56,8 @@ class Data:
     more: viser.GuiButtonHandle
     undo: viser.GuiButtonHandle
     points: viser.GuiUploadButtonHandle  # seen while there is a photograph
-    without: (
-        viser.GuiHtmlHandle
-    )  # a style that hides it: viser draws a button of uploads even if it is not visible
+    # A style that hides it: viser draws a button of uploads even if it is not visible
+    without: viser.GuiHtmlHandle
 
     def show(self, shown: Shown) -> None:
         """Write what is; on the event loop only."""
@@ -68,9 +67,8 @@ class Data:
             handle.visible = shown.photo
         for handle in self.of_asked:
             handle.visible = shown.asked
-        self.points.visible = (
-            shown.photo
-        )  # asked by the guard, which takes no file for what is not visible
+        # Asked by the guard, which takes no file for what is not visible
+        self.points.visible = shown.photo
         self.without.content = "" if shown.photo else _hidden(self.points)
         self.more.visible, self.undo.visible = shown.more, shown.undo
         self.hint.visible = shown.hint is not None

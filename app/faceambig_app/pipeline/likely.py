@@ -24,11 +24,12 @@ from faceambig.posterior import Posterior
 from ..state import Fitting, Target
 from .fits import dense, explained, photograph
 
+# Metres from, to, fits of a posterior of thousands of points; more where it is narrow
 DENSE_GRID = (
     0.2,
     10.0,
     12,
-)  # metres from, to, fits of a posterior of thousands of points; more where it is narrow
+)
 
 
 class Source(NamedTuple):

@@ -25,15 +25,17 @@ from ..text import say
 from .viewer import Sight
 
 TITLE_AT, BAR_AT = 0.155, -0.165  # metres above and below the pivot, where that much is seen
+# Pixels: to the edge of what is seen, of a line of words, from bar to words
 MARGIN, LINE, AIR = (
     14,
     15,
     4,
-)  # pixels: to the edge of what is seen, of a line of words, from bar to words
+)
+# Pixels: of a letter of usual size, and from the words of one head to those of the next
 LETTER, APART = (
     7.0,
     10,
-)  # pixels: of a letter of usual size, and from the words of one head to those of the next
+)
 LINE_ROOM = 125  # pixels that a line below a head may need
 SMALLEST_TITLE, SMALLEST_LINE = 0.7, 0.85  # share of it that letters of a narrow row may have
 END = 0.003  # metres: half the height of the bar's ends

@@ -32,9 +32,8 @@ from .viewer import (
 
 __all__ = ["FAR", "FIRST_FOV", "FIRST_POSITION", "NEAR", "Stage"]
 
-TO_WORLD = np.array(
-    [1.0, -1.0, -1.0]
-)  # camera axes (y down, z forward) to the page's (y up, z to the viewer)
+# Camera axes (y down, z forward) to the page's (y up, z to the viewer)
+TO_WORLD = np.array([1.0, -1.0, -1.0])
 BLINK_SECONDS = 0.5  # each: once round a second
 LIGHTS = (  # direction towards the light in viewer axes (right, up, back), colour, intensity: key from above left
     ("key", (-0.5, 0.7, 1.2), (255, 244, 232), 2.8),

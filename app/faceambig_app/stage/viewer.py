@@ -30,10 +30,11 @@ NARROW = 1100  # pixels: two panels of 372 leave too little for two heads
 WIDE = 1800  # pixels: of a projector; panels of 558 leave 700 for two heads
 PHONE = 577  # pixels: at most 576 wide, viser shows its panel as a sheet over the lower part
 PHONE_HEADS_AT = 0.19  # share of the height, from the top, where the heads stand above the sheet
+# Of a browser that has heard nothing yet; no view uses this angle
 FIRST_POSITION, FIRST_FOV = (
     (0.0, 0.0, LENS),
     0.0257,
-)  # of a browser that has heard nothing yet; no view uses this angle
+)
 ARRIVAL = 5.0  # seconds a browser may take to go where it is put; a busy one took more than 1 when it connected
 ORBIT_REST = 0.25  # seconds without a turn before the place is told
 SAME_TURN, SAME_ZOOM = 0.6, 0.01  # degrees and share that a rounded place may be off
@@ -68,9 +69,8 @@ class Viewer:
     ) -> None:
         self._client, self._moved, self._orbited = client, moved, orbited
         # Of the window, so asked before a panel is docked and takes its share of the canvas
-        self.phone = (
-            0 < client.camera.image_width < PHONE
-        )  # viser's panel is a sheet over the scene
+        # viser's panel is a sheet over the scene
+        self.phone = 0 < client.camera.image_width < PHONE
         self.narrow = 0 < client.camera.image_width < NARROW  # no room for a second panel
         self.wide = client.camera.image_width >= WIDE  # room for panels half as wide again
         self.sight = Sight(np.eye(3), 2 * ZOOM_1 / 800, ZOOM_1, ZOOM_1)
@@ -279,6 +279,5 @@ def quaternion(R: NDArray[np.float64]) -> NDArray[np.float64]:
             [0.0, 0.0, 0.0, R[2, 2] - R[0, 0] - R[1, 1]],
         ]
     )
-    return np.linalg.eigh(K + np.triu(K, 1).T)[1][
-        :, -1
-    ]  # eigenvector of the largest eigenvalue (Bar-Itzhack)
+    # Eigenvector of the largest eigenvalue (Bar-Itzhack)
+    return np.linalg.eigh(K + np.triu(K, 1).T)[1][:, -1]
