@@ -48,10 +48,20 @@ def posterior(options: argparse.Namespace, fit: fa.Fit) -> Result:
         modes.amplitude_mm.tolist(), modes.landmark_percent.tolist(), modes.words, strict=True
     )
     result.rows = [(k, *row) for k, row in enumerate(rows, start=1)]
-    result.record = {
+    result.record = _posterior_record(result.rows, modes, spread)
+    result.lines = _posterior_lines(result.rows, modes, spread, options.free_distance)
+    for k, sd in _signs(len(modes.words), BENT_SD):
+        _add_deviation(result, modes, k, sd)
+    return result
+
+
+def _posterior_record(
+    rows: list[tuple[Any, ...]], modes: fa.PosteriorModes, spread: fa.SurfaceSpread
+) -> dict[str, Any]:
+    return {
         "modes": [
             {"number": k, "words": words, "sd_mm": sd, "landmark_percent": moved, "direction": f}
-            for (k, sd, moved, words), f in zip(result.rows, modes.directions.tolist(), strict=True)
+            for (k, sd, moved, words), f in zip(rows, modes.directions.tolist(), strict=True)
         ],
         "total_mm": modes.total_mm,
         "pose": modes.pose,
@@ -64,13 +74,21 @@ def posterior(options: argparse.Namespace, fit: fa.Fit) -> Result:
             "total_mm": spread.total_mm,
         },
     }
-    result.lines = [
+
+
+def _posterior_lines(
+    rows: list[tuple[Any, ...]],
+    modes: fa.PosteriorModes,
+    spread: fa.SurfaceSpread,
+    free_distance: bool,
+) -> list[str]:
+    return [
         (
-            f"posterior modes, pose {modes.pose}{', distance free' if options.free_distance else ''}, landmark noise "
+            f"posterior modes, pose {modes.pose}{', distance free' if free_distance else ''}, landmark noise "
             f"{modes.noise_px:.2f} px"
         ),
         "mode   1 sd mm   landmarks %   moves",
-        *(f"{k:4} {sd:9.2f} {moved:13.2f}   {words}" for k, sd, moved, words in result.rows),
+        *(f"{k:4} {sd:9.2f} {moved:13.2f}   {words}" for k, sd, moved, words in rows),
         f"all modes together: {modes.total_mm:.2f} mm, rms over the measured surface, 1 sd",
         (
             f"of it by shape {spread.shape_mm:.2f} mm, added by pose {spread.pose_mm:.2f} mm, added by distance "
@@ -78,21 +96,18 @@ def posterior(options: argparse.Namespace, fit: fa.Fit) -> Result:
             f"{spread.prior_mm:.2f} mm"
         ),
     ]
-    for k, sd in _signs(len(modes.words), BENT_SD):
-        alpha = fit.alpha + sd * modes.directions[k]
-        result.faces.append(
-            (
-                name_of("posterior", k, sd),
-                alpha,
-                f"posterior mode {k + 1}, {sd:+g} sd: {modes.words[k]}",
-            )
-        )
-        if k < DRAWN:
-            from ..reports.sheets import deviation_face
 
-            moved = abs(sd) * float(modes.landmark_percent[k])
-            result.drawn.append(deviation_face(k + 1, sd, alpha, moved))
-    return result
+
+def _add_deviation(result: Result, modes: fa.PosteriorModes, k: int, sd: float) -> None:
+    """The fit `sd` standard deviations along mode k: its file and, of the first modes, its picture."""
+    alpha = modes.fit.alpha + sd * modes.directions[k]
+    words = f"posterior mode {k + 1}, {sd:+g} sd: {modes.words[k]}"
+    result.faces.append((name_of("posterior", k, sd), alpha, words))
+    if k < DRAWN:
+        from ..reports.sheets import deviation_face
+
+        moved = abs(sd) * float(modes.landmark_percent[k])
+        result.drawn.append(deviation_face(k + 1, sd, alpha, moved))
 
 
 # ---- extremes ----
@@ -119,7 +134,17 @@ def extremes(options: argparse.Namespace, fit: fa.Fit) -> Result:
         (k, face.rms_mm, face.mean_mm, face.d_s_mm, face.landmark_rms_percent, face.d_l_percent)
         for k, face in enumerate(found.faces, start=1)
     ]
-    result.record = {
+    result.record = _extremes_record(result, found)
+    result.lines = _extremes_lines(result.rows, found)
+    for k, face in enumerate(found.faces, start=1):
+        words = f"extreme face {k}, {face.rms_mm:.2f} mm rms from the fit"
+        result.faces.append((f"extreme_{k}", face.alpha, words))
+        result.drawn.append(extreme_face(k, face))
+    return result
+
+
+def _extremes_record(result: Result, found: fa.ExtremeFaces) -> dict[str, Any]:
+    return {
         "faces": [
             dict(zip(result.header, row, strict=True)) | {"alpha": face.alpha.tolist()}
             for row, face in zip(result.rows, found.faces, strict=True)
@@ -130,24 +155,23 @@ def extremes(options: argparse.Namespace, fit: fa.Fit) -> Result:
         "bound_mm": found.bound_mm,
         "ratio": found.ratio,
     }
-    result.lines = [
-        f"extreme faces, landmarks within {tolerance:g} % rms of the eye distance, pose {found.pose}",
+
+
+def _extremes_lines(rows: list[tuple[Any, ...]], found: fa.ExtremeFaces) -> list[str]:
+    return [
+        (
+            f"extreme faces, landmarks within {found.tolerance_percent:g} % rms of the eye distance, pose {found.pose}"
+        ),
         "face   rms mm   mean mm   d_S mm   landmarks rms %   d_L %",
         *(
             f"{k:4} {rms:8.2f} {mean:9.2f} {d_s:8.2f} {marks:17.2f} {d_l:7.2f}"
-            for k, rms, mean, d_s, marks, d_l in result.rows
+            for k, rms, mean, d_s, marks, d_l in rows
         ),
         (
             f"reached {found.faces[0].rms_mm:.2f} mm rms; no face passes {found.bound_mm:.2f} mm while landmarks are "
             f"linear in the shape, and {100 * found.ratio:.0f} % of that was found there"
         ),
     ]
-    for k, face in enumerate(found.faces, start=1):
-        result.faces.append(
-            (f"extreme_{k}", face.alpha, f"extreme face {k}, {face.rms_mm:.2f} mm rms from the fit")
-        )
-        result.drawn.append(extreme_face(k, face))
-    return result
 
 
 # ---- shared ----

@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import argparse
 import json
+from typing import TYPE_CHECKING, Any
 
 from .shared import GOOD, target, version
+
+if TYPE_CHECKING:
+    from faceambig.io.detect import Detection
+    from faceambig.io.pictures import Picture
 
 
 def add(command: argparse.ArgumentParser) -> None:
@@ -46,35 +51,39 @@ def run(options: argparse.Namespace) -> int:
     write_detection(found, out, drawn, overlay)
     files = [str(path) for path in (out, overlay) if path is not None]
     if options.json:
-        record = {
-            "status": "found",
-            "picture": picture.name,
-            "converted": list(picture.notes),
-            "image_size": list(found.image_size),
-            "scheme": found.scheme,
-            "points": [None if x != x else [x, y] for x, y in found.points.tolist()],
-            "box_px": list(found.box),
-            "score": found.score,
-            "presence_log_odds": found.presence,
-            "n_faces": found.n_faces,
-            "files": files,
-            "version": version(),
-        }
-        print(json.dumps(record))
-        return GOOD
-    for note in picture.notes:
-        print(f"{picture.name}: {note}")
+        print(json.dumps(_record(picture, found, files)))
+    else:
+        print("\n".join(_lines(picture, found, files, options.jaw)))
+    return GOOD
+
+
+def _record(picture: Picture, found: Detection, files: list[str]) -> dict[str, Any]:
+    return {
+        "status": "found",
+        "picture": picture.name,
+        "converted": list(picture.notes),
+        "image_size": list(found.image_size),
+        "scheme": found.scheme,
+        "points": [None if x != x else [x, y] for x, y in found.points.tolist()],
+        "box_px": list(found.box),
+        "score": found.score,
+        "presence_log_odds": found.presence,
+        "n_faces": found.n_faces,
+        "files": files,
+        "version": version(),
+    }
+
+
+def _lines(picture: Picture, found: Detection, files: list[str], jaw: bool) -> list[str]:
     left, top, right, bottom = found.box
-    print(
-        f"{picture.name}: a face from ({left:.0f}, {top:.0f}) to ({right:.0f}, {bottom:.0f}), score {found.score:.2f}"
-    )
+    where = f"from ({left:.0f}, {top:.0f}) to ({right:.0f}, {bottom:.0f})"
+    lines = [f"{picture.name}: {note}" for note in picture.notes]
+    lines.append(f"{picture.name}: a face {where}, score {found.score:.2f}")
     if found.n_faces > 1:
-        print(f"{found.n_faces} faces found; these are the points of the largest")
-    print(
+        lines.append(f"{found.n_faces} faces found; these are the points of the largest")
+    lines.append(
         "68 points; those of the jaw are off by a tenth of the eye distance"
-        if options.jaw
+        if jaw
         else "51 points; the jaw (1 to 17) is left out, --jaw keeps it"
     )
-    if files:
-        print(f"written: {', '.join(files)}")
-    return GOOD
+    return [*lines, f"written: {', '.join(files)}"] if files else lines

@@ -37,6 +37,18 @@ def add(command: argparse.ArgumentParser) -> None:
     add_input(command)
     add_fitting(command)
     add_camera(command)
+    _add_kind(command)
+    _add_kept(command)
+    command.add_argument(
+        "--out", metavar="FOLDER",
+        help="write there, each as .obj, .ply and .glb: the fitted face, and the listed modes to both sides or the "
+        "extreme faces",
+    )  # fmt: skip
+    add_outputs(command, "the modes", "the first of these faces beside the fit")
+
+
+def _add_kind(command: argparse.ArgumentParser) -> None:
+    """Which modes, and what the camera does meanwhile."""
     kind = command.add_mutually_exclusive_group()
     kind.add_argument(
         "--posterior", action="store_true",
@@ -63,6 +75,10 @@ def add(command: argparse.ArgumentParser) -> None:
         action="store_true",
         help="a compensated or free pose has a free distance, too",
     )
+
+
+def _add_kept(command: argparse.ArgumentParser) -> None:
+    """Which of them are kept, and how far faces are bent."""
     command.add_argument(
         "--k1",
         type=float,
@@ -82,12 +98,6 @@ def add(command: argparse.ArgumentParser) -> None:
         "--tolerance", type=float, metavar="PERCENT",
         help="of --extremes: rms landmark distance allowed, %% of the eye distance (default 3)",
     )  # fmt: skip
-    command.add_argument(
-        "--out", metavar="FOLDER",
-        help="write there, each as .obj, .ply and .glb: the fitted face, and the listed modes to both sides or the "
-        "extreme faces",
-    )  # fmt: skip
-    add_outputs(command, "the modes", "the first of these faces beside the fit")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -97,14 +107,12 @@ def run(options: argparse.Namespace) -> int:
     _refuse_unused(options)
     start = start_of(options)
     fit = fit_of(options, start)
-    kind = (
-        kinds.extremes
-        if options.extremes
-        else kinds.posterior
-        if options.posterior
-        else flexible.flexible
-    )
-    result = kind(options, fit)
+    if options.extremes:
+        result = kinds.extremes(options, fit)
+    elif options.posterior:
+        result = kinds.posterior(options, fit)
+    else:
+        result = flexible.flexible(options, fit)
     note = f"{fit.model.name} model; {start.notes['landmarks']}"
     files: dict[Path, bytes] = {}
     if csv is not None:
