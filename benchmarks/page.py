@@ -46,7 +46,6 @@ COLUMNS = (  # heading, name in Bars and of a figure, width
     ("slowest/s", "slowest", 12), ("CPU ms a change", "cpu", 17), ("ours", "own cpu", 7), ("kB", "kB", 7),
     ("lost", "lost", 6), ("wrong", "wrong", 6), ("shared", "shared", 7), ("backward", "backward", 9),
 )  # fmt: skip
-WAYPOINTS = 60  # of the drag whose stages are timed
 ROWS = (
     Bars(1, 20, p50=12, p95=30),
     Bars(10, 10, p95=50),
@@ -92,11 +91,11 @@ async def _rows(server: Server, drags: int) -> None:
 
 
 async def _stages(server: Server) -> dict[str, dict[str, Any]]:
-    """What the server does in a drag by one tab at 20 Hz through WAYPOINTS values, twice."""
+    """What the server does in a drag by one tab at 20 Hz through 60 values, twice."""
     answer = {}
     async with opened(server.address) as tab:
         props = tab.controls[SLIDER].props
-        values = [round(x) for x in np.linspace(props["min"] + 1, props["max"] - 1, WAYPOINTS)]
+        values = [round(x) for x in np.linspace(props["min"] + 1, props["max"] - 1, 60)]
         random.Random(0).shuffle(values)  # noqa: S311 - an order, not a secret
         for name in ("first time", "again"):
             await tab.quiet(QUIET, page_load.PATIENCE)

@@ -4,10 +4,14 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import subprocess
+import sys
 import tempfile
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 # More BLAS threads than cores make a fit of 1 ms take a second
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -29,6 +33,9 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 NO_ICT = (
     "no ICT-FaceKit: FACEAMBIG_ICT names no folder, ../shared/tools/unpack_ict.sh finds no archive"
 )
+
+
+BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
 
 
 def cache_folder() -> Path:
@@ -78,3 +85,21 @@ def ict_path() -> Path:
 def ict(ict_path: Path) -> FaceModel:
     """ICT-FaceKit's face part, origin between the eyes; skips without it."""
     return fio.load_model(ict_path)
+
+
+@pytest.fixture(scope="module")
+def benchmarks() -> Iterator[Callable[[str], Any]]:
+    """Imports a script of the benchmarks as its neighbours find it: their folder on the path."""
+    before = set(sys.modules)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(BENCHMARKS))
+        yield importlib.import_module
+    for name in set(sys.modules) - before:  # their names are too plain to stay
+        if Path(getattr(sys.modules[name], "__file__", None) or "").parent == BENCHMARKS:
+            del sys.modules[name]
+
+
+@pytest.fixture(scope="module")
+def wires(benchmarks: Callable[[str], Any]) -> Any:
+    """The browser without pictures of the soak test."""
+    return benchmarks("wire")

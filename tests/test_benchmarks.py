@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import importlib
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,18 +14,6 @@ from faceambig.fitting.task import prepare
 from strategies import tiny_model
 
 MODEL = tiny_model(n_vertices=24, n_modes=6, seed=4)
-FOLDER = Path(__file__).resolve().parents[1] / "benchmarks"
-
-
-@pytest.fixture
-def benchmarks(monkeypatch):
-    """Imports a script of the benchmarks, as it is found by the others: its folder on the path."""
-    monkeypatch.syspath_prepend(str(FOLDER))
-    before = set(sys.modules)
-    yield importlib.import_module
-    for name in set(sys.modules) - before:
-        if Path(getattr(sys.modules[name], "__file__", None) or "").parent == FOLDER:
-            del sys.modules[name]
 
 
 def problems_of(benchmarks, work: str) -> list[tuple[Problem, float]]:

@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-import importlib
-import sys
 from pathlib import Path
 
 import pytest
-
-FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 
 pytestmark = [
     pytest.mark.slow,
@@ -17,17 +13,6 @@ pytestmark = [
         not Path("/proc/self/statm").exists(), reason="what is held is read in /proc"
     ),
 ]
-
-
-@pytest.fixture
-def benchmarks(monkeypatch):
-    """Imports a script of the benchmarks, as it is found by the others: its folder on the path."""
-    monkeypatch.syspath_prepend(str(FOLDER))
-    before = set(sys.modules)
-    yield importlib.import_module
-    for name in set(sys.modules) - before:
-        if Path(getattr(sys.modules[name], "__file__", None) or "").parent == FOLDER:
-            del sys.modules[name]
 
 
 def test_thirty_browsers_come_and_go_and_leave_nothing(benchmarks):
@@ -45,13 +30,20 @@ def test_two_controls_in_one_instant_both_count(benchmarks):
         assert asyncio.run(benchmarks("page_race").race(served.address, 1)) == []
 
 
-def test_the_stages_of_a_drag_are_found_and_timed(benchmarks, monkeypatch):
-    page = benchmarks("page")
-    monkeypatch.setattr(page, "WAYPOINTS", 3)
-    with benchmarks("page_server").running(stages=True) as served:
-        told = asyncio.run(page._stages(served))
-    for name in ("hear", "fit", "compose", "figures", "stage", "pack", "send"):
-        _, wall, calls = told["first time"]["stages"][name]
+def test_the_stages_of_a_drag_are_found_and_timed(benchmarks):
+    tabs, load = benchmarks("page_tab"), benchmarks("page_load")
+
+    async def drag(address: str) -> None:
+        async with tabs.opened(address) as tab:
+            for value in (31, 57):
+                await tab.set(load.SLIDER, value)
+                await tab.quiet(load.QUIET, load.PATIENCE)  # drawn in full
+
+    server = benchmarks("page_server")
+    with server.running(stages=True) as served:
+        asyncio.run(drag(served.address))
+        told = served.ask("stages")["stages"]
+    assert set(told) >= {*server.STAGES, "pack", "send"}
+    for name, (_, wall, calls) in told.items():
         assert wall > 0, name
         assert calls > 0, name
-    assert told["again"]["stages"].get("fit", (0, 0, 0))[2] < told["first time"]["stages"]["fit"][2]

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import http.client
-import importlib
 import re
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -24,7 +21,6 @@ from faceambig_app.state import DEFAULT, ViewState, changed
 from faceambig_app.text import say, speaking
 
 SOON = 60.0  # seconds: other tests share the processors
-FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 LEAD = "a-secret-of-the-teacher-1"
 TOKEN = "a-token-of-the-class-12"
 PLACE, STEP = next(
@@ -35,15 +31,6 @@ PLACE, STEP = next(
 )
 ASK = STEP.ask or Ask("", (), None, "")
 ASKS = f"lesson={PLACE[0]}&step={PLACE[1]}"
-
-
-@pytest.fixture(scope="module")
-def wires() -> Iterator[Any]:
-    """The browser without pictures of the soak test."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(FOLDER))
-        yield importlib.import_module("wire")
-        del sys.modules["wire"]
 
 
 @pytest.fixture

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import importlib
-import sys
-from pathlib import Path
 from typing import Any
 
 from faceambig_app import server
@@ -13,15 +10,12 @@ from faceambig_app.display import Display
 from faceambig_app.notices import cause
 from faceambig_app.text import say
 
-FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 SLIDER = "Assumed distance"
 BROKEN = ZeroDivisionError("the model is broken")
 
 
-def test_controls_are_said_again_after_a_frame_that_failed(monkeypatch):
-    monkeypatch.syspath_prepend(str(FOLDER))
-    opened = importlib.import_module("page_tab").opened
-    monkeypatch.delitem(sys.modules, "page_tab")
+def test_controls_are_said_again_after_a_frame_that_failed(monkeypatch, benchmarks):
+    opened = benchmarks("page_tab").opened
     page = server.Page("127.0.0.1", 0)
 
     def fail(*_: object) -> None:
@@ -43,10 +37,7 @@ def test_controls_are_said_again_after_a_frame_that_failed(monkeypatch):
         page.close()
 
 
-def test_a_panel_that_is_made_anew_under_a_moving_hand_is_not_written_into(monkeypatch, caplog):
-    monkeypatch.syspath_prepend(str(FOLDER))
-    wires = importlib.import_module("wire")
-    monkeypatch.delitem(sys.modules, "wire")
+def test_a_panel_that_is_made_anew_under_a_moving_hand_is_not_written_into(wires, caplog):
     there: set[str] = set()
     lost: list[dict[str, Any]] = []
 

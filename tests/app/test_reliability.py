@@ -7,11 +7,9 @@ from __future__ import annotations
 
 import asyncio
 import gc
-import importlib
 import itertools
 import random
 import socket
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -34,16 +32,6 @@ from faceambig_app.state import DEFAULT, changed
 from faceambig_app.state.link import query
 
 SOON = 60.0  # seconds: other tests share the processors
-FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
-
-
-@pytest.fixture(scope="module")
-def wires() -> Iterator[Any]:
-    """The browser without pictures of the soak test."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(FOLDER))
-        yield importlib.import_module("wire")
-        del sys.modules["wire"]
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import re
 import signal
 import socket
@@ -18,7 +17,6 @@ from typing import Any
 import pytest
 
 SOON = 60.0  # seconds: other tests share the processors
-FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 MAIN = "import sys; from faceambig_app.cli import main; sys.exit(main())"
 # All that is computed for a browser takes a minute, and a photograph is being read for as long
 SLOW = """
@@ -42,15 +40,6 @@ HANDSHAKE = (
     "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
     "Sec-WebSocket-Protocol: viser-v1.1.1\r\n\r\n"
 )
-
-
-@pytest.fixture(scope="module")
-def wires() -> Iterator[Any]:
-    """The browser without pictures of the soak test."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(FOLDER))
-        yield importlib.import_module("wire")
-        del sys.modules["wire"]
 
 
 @contextmanager
