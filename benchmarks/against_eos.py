@@ -22,7 +22,8 @@ from timing import about, compare
 
 import faceambig as fa
 from faceambig.arrays import Array
-from faceambig.fitting.solve import Problem, solve
+from faceambig.fitting.problem import Problem
+from faceambig.fitting.solve import solve
 from faceambig.fitting.start import centred_pinv, start_pose
 from faceambig.model import Scheme
 

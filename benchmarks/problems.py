@@ -18,7 +18,7 @@ from scipy.optimize import least_squares
 import faceambig as fa
 from faceambig.arrays import Array
 from faceambig.camera import Camera, project
-from faceambig.fitting.solve import NEAREST_KAPPA, Problem
+from faceambig.fitting.problem import NEAREST_KAPPA, Problem
 from faceambig.observation import portrait_camera
 from faceambig.rotation import cross_matrix, rotation_matrix
 

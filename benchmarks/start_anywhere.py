@@ -29,7 +29,8 @@ import numpy as np
 
 import faceambig as fa
 from faceambig.camera import Camera, depths, project
-from faceambig.fitting.solve import Problem, Solution, solve
+from faceambig.fitting.problem import Problem
+from faceambig.fitting.solve import Solution, solve
 from faceambig.fitting.start import start_pose
 from faceambig.fitting.task import FIRST_KAPPA, prepare
 from faceambig.observation import portrait_camera

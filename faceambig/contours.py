@@ -22,7 +22,8 @@ from .arrays import Array, IntArray, checked, number, positive, read_only, whole
 from .boundary import occluding_boundary
 from .camera import Camera, project
 from .fitting import Fit, FitOptions
-from .fitting.solve import Problem, Solution, cost
+from .fitting.problem import Problem, cost
+from .fitting.solve import Solution
 from .fitting.task import Task, answer, kappa_of, prepare, solve_by, start_of
 from .model import FaceModel
 from .observation import LARGEST_PX, Observation
@@ -115,7 +116,7 @@ def contour_fit(
 
     Parameters
     ----------
-    edges: (E, 2) pixels, such as `io.pictures.canny_edges` finds; in the coordinates of the landmarks.
+    edges: (E, 2) pixels, such as `io.edges.canny_edges` finds; in the coordinates of the landmarks.
     max_distance_px: pixels between the points of a pair; None for 15 % of the interocular distance.
     pair_weight: of each pair, beside landmarks of weight 1. Pairs are many, some 400, and known in one direction only.
     max_iterations: 5 to 30 are usual at the right distance; at a wrong one the pairs may never come to rest.

@@ -14,7 +14,7 @@ import numpy as np
 from .arrays import Array, IntArray
 from .errors import NotConverged
 from .fitting import Fit
-from .fitting.solve import Problem, evaluate, normal_equations
+from .fitting.problem import Problem, evaluate, normal_equations
 from .truncated import box_moments
 
 

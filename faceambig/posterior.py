@@ -26,7 +26,8 @@ from .fitting.task import FARTHEST, NEAREST, Task, landmark_rows, prepare, start
 from .laplace import Laplace, between_nodes, laplace_at, nearest_node, refuse_unconverged
 from .model import FaceModel
 from .observation import LARGEST_PX, Observation
-from .sweep import Sweep, cold, follow, sweep_from
+from .path import cold, follow
+from .sweep import Sweep, sweep_from
 from .truncated import box_draws, box_moments
 
 GRID = (0.2, 10.0, 48)  # metres from, to, fits

@@ -1,8 +1,7 @@
 """Fits along the camera distance: how d_L hardly changes while the face does (paper, section 6.1).
 
-The grid is uniform in log t_z and ends in the orthographic camera, kappa = 0. The path is followed from there to the
-nearest distance. Each fit starts from its neighbours: only kappa changes, in the unified camera nothing else needs
-rescaling (MATH.md 6), and the way of the last three fits is carried on, which saves a third of the steps.
+The grid is uniform in log t_z and ends in the orthographic camera, kappa = 0. The path (path.py) is followed from there
+to the nearest distance.
 
 Both ends are checked by fits that know nothing of the path: it begins at one, and where it arrives another is made
 from the closed-form pose. If their costs agree the path is taken for the only one; if not, it is followed back from
@@ -11,29 +10,24 @@ there as well, the lower of each two fits is kept, and the sweep says where they
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import Array, checked, number, read_only
-from .camera import Camera
 from .fitting import Fit, FitOptions
 from .fitting.result import Jacobian, Method, Weighting
-from .fitting.solve import cost
-from .fitting.tangent import tangent
-from .fitting.task import FARTHEST, NEAREST, Task, prepare, solve_from, start_of
+from .fitting.task import FARTHEST, NEAREST, Task, prepare
 from .metrics import HUMAN_TOLERANCE_PERCENT
 from .model import FaceModel
 from .observation import Observation
-from .rotation import rotation_matrix
+from .path import at, cold, follow, path_speeds
 
 GRID = (0.2, 3.0, 49)  # metres from, to, steps: the range of the page's slider
 END_TOLERANCE = 0.01  # relative, how exactly the ends of an interval are found
 STRAIGHT = 20.0  # metres; farther, d_L goes to its limit like 1 / t_z and does not turn (MATH.md 6)
-WIDEST = 1.5  # of the last step: a next one wider than that is not extrapolated to
 SPEEDS_AT_ONCE = 32  # fits whose surfaces are in memory together
 GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 # Two fits at one distance differ if their costs do, relatively by more than the solver's leftover, and by more than
@@ -201,128 +195,16 @@ def sweep_from(
     return Sweep(grid, tuple(path[:0:-1]), path[0], np.array(disagreed[::-1]))
 
 
-def follow(
-    task: Task,
-    kappas: Sequence[float],
-    first: Fit,
-    progress: Callable[[int], object] | None = None,
-) -> list[Fit]:
-    """Fits at `kappas`, per metre, each from those before it; `first` is the one at kappas[0]."""
-    path = [first]
-    for kappa in kappas[1:]:
-        path.append(_next(task, path[-3:], kappa))
-        if progress is not None:
-            progress(1)
-    return path
-
-
-def _next(task: Task, last: Sequence[Fit], kappa: float) -> Fit:
-    """The fit at kappa after `last`; where it does not converge, the best of other starts that does.
-
-    Where the shape is hardly held, a path ends at a fold, and what lies beyond is far away.
-    """
-    fit = solve_from(task, *_start(task, last, kappa))
-    if fit.converged or not task.options.least_squares:
-        return fit
-    starts = (replace(last[-1].camera, kappa=kappa), last[-1].alpha), start_of(task, kappa)
-    others = [solve_from(task, *start) for start in starts if cost(task.problem, *start) < np.inf]
-    return min(
-        (other for other in others if other.converged), key=lambda other: other.cost, default=fit
-    )
-
-
-def path_speeds(fits: Sequence[Fit]) -> Array:
-    """Speed (D,) of the face along the path through each of `fits`, of one task: `Sweep.speed_mm_per_octave`."""
-    task, model = prepare(fits[0].model, fits[0].observation, fits[0].options), fits[0].model
-    # (S, D, 2) shape and velocity of all at once: the modes are read from memory once, not once a fit
-    changes = np.zeros((model.n_modes, len(fits), 2))
-    for k, fit in enumerate(fits):
-        S = len(fit.alpha)
-        changes[:S, k, 0] = fit.alpha
-        changes[:S, k, 1] = tangent(task.problem, fit.camera, fit.alpha)[:S]
-    flat = model.control_modes.reshape(-1, model.n_modes) @ changes.reshape(model.n_modes, -1)
-    surface = model.refine(flat.reshape(len(model.control_mean), -1)).reshape(-1, 3, len(fits), 2)
-    mean = model.mean
-    if model.evaluation is not None:
-        surface, mean = surface[model.evaluation], mean[model.evaluation]
-    unrigid = [_unrigid(mean + surface[:, :, k, 0], surface[:, :, k, 1]) for k in range(len(fits))]
-    return 1e3 * np.log(2.0) * np.array([np.linalg.norm(gap, axis=1).mean() for gap in unrigid])
-
-
-def _unrigid(shape: Array, velocity: Array) -> Array:
-    """`velocity` (E, 3) of the points `shape` (E, 3) without the rigid one a + w x shape nearest to it.
-
-    Procrustes to first order.
-    """
-    centred, velocity = shape - shape.mean(axis=0), velocity - velocity.mean(axis=0)
-    spread = centred.T @ centred
-    inertia = np.trace(spread) * np.eye(3) - spread
-    twist = centred.T @ velocity
-    x, y, z = np.linalg.solve(
-        inertia, [twist[1, 2] - twist[2, 1], twist[2, 0] - twist[0, 2], twist[0, 1] - twist[1, 0]]
-    )
-    return velocity - centred @ np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
-
-
-def cold(task: Task, kappa: float) -> Fit:
-    """The fit at kappa, per metre, from the closed-form pose, which knows no other."""
-    return solve_from(task, *start_of(task, kappa))
-
-
 def _differ(task: Task, a: Fit, b: Fit) -> bool:
     slack = SAME_COST * min(a.cost, b.cost) + float(task.problem.weights.sum()) * SAME_PX**2
     return abs(a.cost - b.cost) > max(1.0, task.options.tolerance / 1e-8) * slack
-
-
-def _start(task: Task, last: Sequence[Fit], kappa: float) -> tuple[Camera, Array]:
-    """Where a fit at kappa starts: the polynomial through the last fits, one to three, or the last one, or afresh.
-
-    A polynomial carried far beyond its points ends anywhere: a step much wider than the last starts from its neighbour.
-    Nor one through fits between which the path has leapt: then the neighbour itself costs less. The tangent of the
-    path would save no more steps, and costs two.
-    """
-    still = last[-1]
-    step, gap = kappa - still.camera.kappa, still.camera.kappa - last[-2:][0].camera.kappa
-    starts = [(replace(still.camera, kappa=kappa), still.alpha)]
-    if gap and 0 < step / gap <= WIDEST:
-        starts.insert(0, _carried_on(last, kappa))
-    costs = [cost(task.problem, *start) for start in starts]
-    if min(costs) == np.inf:  # behind the camera
-        return start_of(task, kappa)
-    return starts[int(np.argmin(costs))]
-
-
-def _carried_on(last: Sequence[Fit], kappa: float) -> tuple[Camera, Array]:
-    """Camera and shape at kappa of the polynomial in kappa through the last fits, two or three, oldest first."""
-    *before, still = last
-    camera, at = still.camera, [fit.camera.kappa for fit in last]
-    # Added to the last fit: what does not change between fits, coefficients on the box, stays to the last digit
-    alpha, t, log_s, turn = still.alpha.copy(), camera.t.copy(), 0.0, np.zeros((3, 3))
-    for a, fit in zip(at, before, strict=False):
-        weight = math.prod((kappa - b) / (a - b) for b in at if b != a)  # Lagrange's
-        alpha += weight * (fit.alpha - still.alpha)
-        t += weight * (fit.camera.t - camera.t)
-        log_s += weight * math.log(fit.camera.s / camera.s)
-        turn += weight * fit.camera.R
-    turn = turn @ camera.R.T  # of small angles: its antisymmetric part is the rotation
-    d = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
-    box = still.options.box
-    if box is not None:
-        alpha = alpha.clip(-box, box)
-    return Camera(rotation_matrix(d) @ camera.R, t, camera.s * math.exp(log_s), kappa), alpha
-
-
-def _at(fit: Fit, kappa: float) -> Fit:
-    """The fit at kappa on the path through `fit`."""
-    task = prepare(fit.model, fit.observation, fit.options)
-    return solve_from(task, *_start(task, [fit], kappa))
 
 
 def _to_infinity(sweep: Sweep) -> list[Fit]:
     """The fits from the nearest to the orthographic one; beyond the sweep's farthest, one each doubling."""
     nodes = list(sweep.fits)
     while STRAIGHT * nodes[-1].camera.kappa > 1.0:
-        nodes.append(_at(nodes[-1], 0.5 * nodes[-1].camera.kappa))
+        nodes.append(at(nodes[-1], 0.5 * nodes[-1].camera.kappa))
     return [*nodes, sweep.orthographic]
 
 
@@ -346,16 +228,16 @@ def _turn(near: Fit, far: Fit, sign: float) -> Fit:
     """The fit between two where sign * d_L is least, by golden section in kappa to 1 %."""
     a, b = far.camera.kappa, near.camera.kappa
     x, y = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
-    at_x, at_y = _at(near, x), _at(near, y)
+    at_x, at_y = at(near, x), at(near, y)
     while b - a > END_TOLERANCE * b:
         if sign * at_x.d_l_percent < sign * at_y.d_l_percent:
             b, y, at_y = y, x, at_x
             x = b - GOLDEN * (b - a)
-            at_x = _at(at_y, x)
+            at_x = at(at_y, x)
         else:
             a, x, at_x = x, y, at_y
             y = a + GOLDEN * (b - a)
-            at_y = _at(at_x, y)
+            at_y = at(at_x, y)
     return min(at_x, at_y, key=lambda fit: sign * fit.d_l_percent)
 
 
@@ -371,7 +253,7 @@ def _crossing(inside: Fit, outside: Fit, tolerance: float) -> float | None:
         kappa = float(np.sqrt(a * b)) if min(a, b) > 0 else 0.5 * max(a, b)
         if kappa * FARTHEST < 1.0:
             return None
-        fit = _at(outside if a == 0 else inside, kappa)
+        fit = at(outside if a == 0 else inside, kappa)
         if fit.d_l_percent <= tolerance:
             inside = fit
         else:

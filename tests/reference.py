@@ -9,7 +9,8 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from faceambig.camera import Camera
-from faceambig.fitting.solve import Problem, Solution, moved_camera
+from faceambig.fitting.problem import Problem, moved_camera
+from faceambig.fitting.solve import Solution
 
 
 def rotation_series(r: np.ndarray) -> np.ndarray:

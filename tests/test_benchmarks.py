@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import faceambig as fa
-from faceambig.fitting.solve import Problem, solve
+from faceambig.fitting.problem import Problem
+from faceambig.fitting.solve import solve
 from faceambig.fitting.start import start_pose
 from faceambig.fitting.task import prepare
 from strategies import tiny_model

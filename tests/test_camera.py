@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 
 from faceambig.camera import Camera, camera_points, depths, jacobian, project
-from faceambig.fitting.solve import moved_camera
+from faceambig.fitting.problem import moved_camera
 from reference import pinhole
 from strategies import cameras, tiny_model
 

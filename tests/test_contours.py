@@ -15,7 +15,7 @@ from faceambig.boundary import contour_points, inner_edges, occluding_boundary
 from faceambig.camera import Camera, project
 from faceambig.contours import SETTLED_MM, match
 from faceambig.fitting.task import landmark_rows
-from faceambig.io.pictures import canny_edges
+from faceambig.io.edges import canny_edges
 from faceambig.metrics import surface_difference
 from faceambig.model import FaceModel, Subject
 from faceambig.observation import portrait_camera

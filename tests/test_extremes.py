@@ -15,7 +15,7 @@ import faceambig as fa
 from faceambig.camera import Camera, project
 from faceambig.extremes.dual import upper_bound
 from faceambig.extremes.marks import Marks
-from faceambig.fitting.solve import moved_camera
+from faceambig.fitting.problem import moved_camera
 from faceambig.flex import gram
 from strategies import face_of, tiny_model
 

@@ -16,7 +16,8 @@ from scipy.stats import binom, norm, truncnorm
 
 import faceambig as fa
 from faceambig.errors import NotConverged
-from faceambig.fitting.solve import Problem, Solution, evaluate, kkt_error, normal_equations
+from faceambig.fitting.problem import Problem, evaluate, normal_equations
+from faceambig.fitting.solve import Solution, kkt_error
 from faceambig.fitting.task import prepare
 from faceambig.truncated import box_draws, box_moments, cut_moments
 from reference import log_posterior

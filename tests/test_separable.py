@@ -13,6 +13,7 @@ from scipy.optimize import least_squares
 
 import faceambig as fa
 from faceambig.camera import Camera, project
+from faceambig.fitting.problem import Problem
 from faceambig.fitting.result import Weighting
 from faceambig.fitting.separable import (
     WIDEST_VIEW,
@@ -24,7 +25,7 @@ from faceambig.fitting.separable import (
     perspective_rows,
     separate,
 )
-from faceambig.fitting.solve import Problem, Solution
+from faceambig.fitting.solve import Solution
 from faceambig.fitting.start import start_pose
 from faceambig.fitting.task import prepare
 from faceambig.rotation import R0, rotation_jacobian, rotation_matrix

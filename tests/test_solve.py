@@ -11,15 +11,8 @@ from hypothesis import strategies as st
 
 import faceambig as fa
 from faceambig.camera import jacobian, project
-from faceambig.fitting.solve import (
-    Problem,
-    Solution,
-    evaluate,
-    gradient,
-    kkt_error,
-    normal_equations,
-    solve,
-)
+from faceambig.fitting.problem import Problem, evaluate, gradient, normal_equations
+from faceambig.fitting.solve import Solution, kkt_error, solve
 from faceambig.fitting.start import start_pose
 from faceambig.fitting.task import prepare
 from strategies import cameras, face_of, tiny_model

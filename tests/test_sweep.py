@@ -13,8 +13,9 @@ import faceambig as fa
 from faceambig.fitting.tangent import tangent
 from faceambig.fitting.task import prepare, solve_from, start_of
 from faceambig.metrics import surface_difference
+from faceambig.path import follow
 from faceambig.rotation import axis_angle
-from faceambig.sweep import END_TOLERANCE, follow
+from faceambig.sweep import END_TOLERANCE
 from strategies import face_of, tiny_model
 
 MODEL = tiny_model(n_vertices=24, n_modes=6, seed=4)

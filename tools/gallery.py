@@ -23,7 +23,8 @@ import faceambig as fa
 from faceambig import compose
 from faceambig.boundary import occluding_boundary
 from faceambig.camera import project
-from faceambig.io.pictures import canny_edges, read_picture
+from faceambig.io.edges import canny_edges
+from faceambig.io.pictures import read_picture
 from faceambig.observation import portrait_camera
 from faceambig.render import painter
 from faceambig.render.canvas import Canvas

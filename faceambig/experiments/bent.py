@@ -18,7 +18,7 @@ from ..camera import project
 from ..contours import ContourFit, contour_fit
 from ..fitting import Fit, fit
 from ..flex import FlexibilityModes, flexibility_modes, plausible_limit
-from ..io.pictures import canny_edges
+from ..io.edges import canny_edges
 from ..metrics import HUMAN_TOLERANCE_PERCENT, mean_gap_percent
 from ..model import FaceModel, Subject
 from ..observation import Observation, observe, portrait_camera

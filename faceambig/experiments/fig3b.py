@@ -14,8 +14,9 @@ import numpy as np
 from ..arrays import Array
 from ..camera import Camera
 from ..fitting import FitOptions
+from ..fitting.problem import Problem, cost
 from ..fitting.separable import separate
-from ..fitting.solve import Problem, cost, solve
+from ..fitting.solve import solve
 from ..fitting.task import prepare, start_of
 from ..model import FaceModel
 from ..observation import observe

@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Array
 from ..camera import Camera, depths, jacobian, project
 from ..fitting import Fit
-from ..fitting.solve import POSE
+from ..fitting.problem import POSE
 from ..fitting.task import best_camera, landmark_rows
 from ..model import FaceModel
 

@@ -13,18 +13,9 @@ import numpy as np
 from ..arrays import Array
 from ..camera import Camera
 from .boxqp import AT_HIGH, AT_LOW, solve_box_qp
+from .problem import Point, Problem, evaluate, limits, moved_view, normal_equations, theta_of
 from .result import FitOptions, Status
-from .solve import (
-    Point,
-    Problem,
-    Solution,
-    evaluate,
-    limits,
-    moved_view,
-    normal_equations,
-    solution_at,
-    theta_of,
-)
+from .solve import Solution, solution_at
 
 STEPS = 5  # Gauss-Newton steps a half round; from the last round's pose 2 or 3 settle it
 SETTLED = 1e-12  # promised decrease, of E, that is not worth another step

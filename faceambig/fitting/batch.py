@@ -18,21 +18,9 @@ from ..arrays import Array, whole
 from ..camera import Camera, Seen, View
 from ..rotation import rotation_matrix
 from .boxqp import Pass, passes
+from .problem import POSE, Point, Problem, gradient, normal_equations, residuals
 from .result import FitOptions
-from .solve import (
-    POSE,
-    First,
-    Gradient,
-    Linearised,
-    Point,
-    Problem,
-    Solution,
-    Trial,
-    descent,
-    gradient,
-    normal_equations,
-    residuals,
-)
+from .solve import First, Gradient, Linearised, Solution, Trial, descent
 from .task import solve_by
 
 CHUNK = 32  # faces side by side: their J fill 3 MB; fewer cost more calls, more leave the cache

@@ -37,8 +37,9 @@ from ..arrays import Array
 from ..camera import Camera
 from ..rotation import rotation_jacobian, rotation_matrix
 from .boxqp import FREE, solve_box_qp
+from .problem import NEAREST_KAPPA, Problem, cost
 from .result import FitOptions, Jacobian, Status
-from .solve import NEAREST_KAPPA, Problem, Solution, cost, solve
+from .solve import Solution, solve
 
 FARTHEST_FREE = 100.0  # metres, for t_z of a free DLT: perspective moves no landmark by 0.02 % there (MATH.md 6)
 # tan of half the field of view. A smaller f is no lens but the hole of E4: at f -> 0 the DLT residual vanishes.

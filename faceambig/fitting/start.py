@@ -10,7 +10,8 @@ from scipy.linalg import lapack
 
 from ..arrays import Array
 from ..camera import Camera
-from .solve import Problem, solve
+from .problem import Problem
+from .solve import solve
 
 # Sines of degrees that the nose points away from the camera, negative towards it. Measured on ICT-FaceKit and the cases
 # of benchmarks/start_anywhere.py, 68 points: the closed form says -6 or less to yaw 75 and pitch 40, up to 8 to yaw 90,

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..camera import Camera, jacobian, project
-from .solve import POSE, Problem
+from .problem import POSE, Problem
 
 ON_BOX = 1e-9  # of the box: nearer is on it; clipping a whole step leaves rounding
 

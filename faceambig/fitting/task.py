@@ -13,9 +13,10 @@ from ..model import FaceModel, Scheme
 from ..observation import FLATTEST, MIN_POINTS, Observation, eye_distance
 from .als import solve_alternating
 from .checks import check_model
+from .problem import Problem
 from .result import Fit, FitOptions
 from .separable import solve_separable
-from .solve import Problem, Solution, solve
+from .solve import Solution, solve
 from .start import at_distance, centred_pinv, pose_from_points, refuse_face_from_behind
 
 NEAREST = 0.2  # metres: nearer fits put the nose of large faces behind the camera (MATH.md 1)

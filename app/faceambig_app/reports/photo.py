@@ -122,7 +122,7 @@ def fitted(model: fa.FaceModel, start: Given, *, contours: bool = False, **optio
         return Outcome(fit, fit.converged, None)
     if start.picture is None:
         raise ValueError("contours: the photograph is needed, not only its points")
-    from faceambig.io.pictures import canny_edges
+    from faceambig.io.edges import canny_edges
 
     edges = canny_edges(start.picture.rgb)
     result = fa.contour_fit(model, start.observation, edges, **options)
