@@ -14,7 +14,7 @@ from hypothesis import given, settings
 
 import faceambig as fa
 from faceambig.errors import AssetError
-from faceambig.experiments import crowd, experiment, fig8, fig9, forensic, people
+from faceambig.experiments import crowd, experiment, fig8, fig9, forensic, people, recognition
 from faceambig.experiments.bent import BEND_MM, one_subject
 from faceambig.experiments.contoured import one_subject as contoured
 from faceambig.experiments.counts import counted
@@ -222,12 +222,12 @@ def test_area_is_how_often_the_true_pair_scores_higher():
     score = RNG.normal(size=(7, 7)).round(1) + 0.5 * np.eye(7)
     own, others = np.diag(score), score[~np.eye(7, dtype=bool)]
     wins = (own[:, None] > others).mean() + 0.5 * (own[:, None] == others).mean()
-    assert fig9.area(*fig9.roc(score)) == pytest.approx(wins, abs=1e-12)
+    assert recognition.area(*recognition.roc(score)) == pytest.approx(wins, abs=1e-12)
 
 
 def test_distances_of_many_faces_are_d_s():
     faces = RNG.normal(size=(4, 20, 3))
-    apart = fig9.apart_mm(faces)
+    apart = recognition.apart_mm(faces)
     for i in range(4):
         for j in range(i + 1, 4):
             assert apart[i, j] == pytest.approx(

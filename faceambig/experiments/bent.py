@@ -128,6 +128,26 @@ def run_bent(figure: Figure, settings: Settings, progress: Progress) -> Outcome:
     found = over_subjects(work, numbers, settings, progress)
     means = {name: np.mean([one[name] for one in found], axis=0) for name in found[0]}
     limit = plausible_limit(min(70, model.n_modes))
+    people = f"{', '.join(map(str, numbers))} of {who(settings, max(numbers))}"
+    camera = "orthographic" if figure.distance is None else f"{100 * figure.distance:.0f} cm"
+    return Outcome(
+        figure.name,
+        figure.title,
+        (table(means, limit, camera, people),),
+        (),
+        (picture(model, figure, seed),),
+        claims(figure, means, limit, len(numbers)),
+        {
+            "photograph": f"from {100 * ACTUAL:.0f} cm, landmarks with noise of {NOISE_PERCENT:g} % per coordinate",
+            "fit": f"{camera}; 70 modes, box 2 sd, to landmarks and Canny's edges together",
+            "subjects": len(numbers),
+            "seed": seed,
+        },
+    )
+
+
+def table(means: Numbers, limit: float, camera: str, people: str) -> Table:
+    """The three faces; what is plausible and what a shift would do in the note."""
     rows = tuple(
         (
             name, float(means["moved"][k]), float(means["error"][k]), float(means["size"][k]),
@@ -136,31 +156,15 @@ def run_bent(figure: Figure, settings: Settings, progress: Progress) -> Outcome:
         for k, name in enumerate(NAMES)
     )  # fmt: skip
     low, high = means["reach"].tolist()
-    camera = "orthographic" if figure.distance is None else f"{100 * figure.distance:.0f} cm"
-    return Outcome(
-        figure.name,
-        figure.title,
+    return Table(
+        f"The first mode of landmarks and edges, {camera}",
         (
-            Table(
-                f"The first mode of landmarks and edges, {camera}",
-                (
-                    "face", "landmarks move, %", "d_L to the photograph, %", f"|alpha| (a face: at most {limit:.1f})",
-                    "sampled colours change, of 255",
-                ),
-                rows,
-                f"photographs of {', '.join(map(str, numbers))} of {who(settings, max(numbers))}, means; "
-                f"a plausible face lies from {low:.1f} to {high:.1f} mm; "
-                f"a shift by {HUMAN_TOLERANCE_PERCENT:g} % changes colours by {means['shifted']:.1f}",
-            ),
+            "face", "landmarks move, %", "d_L to the photograph, %", f"|alpha| (a face: at most {limit:.1f})",
+            "sampled colours change, of 255",
         ),
-        (),
-        (picture(model, figure, seed),),
-        claims(figure, means, limit, len(numbers)),
-        {
-            "photograph": f"from {100 * ACTUAL:.0f} cm, landmarks with noise of {NOISE_PERCENT:g} % per coordinate",
-            "fit": f"{camera}; 70 modes, box 2 sd, to landmarks and Canny's edges together",
-            "subjects": len(numbers), "seed": seed,
-        },
+        rows,
+        f"photographs of {people}, means; a plausible face lies from {low:.1f} to {high:.1f} mm; "
+        f"a shift by {HUMAN_TOLERANCE_PERCENT:g} % changes colours by {means['shifted']:.1f}",
     )  # fmt: skip
 
 

@@ -32,6 +32,7 @@ AT_WRONG = (
     "The paper shows one face. At a wrong distance a wrong shape meets the contour as well as the landmarks: what is "
     "gained is far from what the right distance gives."
 )
+COLUMNS = tuple(f"{method}, {what}" for method in METHODS for what in ("d_S mm", "d_L %"))
 # Landmark noise that the prior assumes, percent: the paper's light weight, and the library's own
 PRIORS = (("light prior", 0.1), ("default prior", 1.0))
 SUBJECTS, QUICK_SUBJECTS = 10, 1
@@ -50,6 +51,11 @@ class Pair:
     rotated: int
     contours: str  # what the paper's rotated face gains from contours
     published: tuple[str, ...]  # frontal, then rotated: d_S mm / d_L % of the three methods
+
+    @property
+    def shown(self) -> tuple[tuple[int, float], ...]:
+        """Subject and yaw of each picture."""
+        return ((self.frontal, 0.0), (self.rotated, YAW))
 
 
 class View(NamedTuple):
@@ -91,14 +97,15 @@ def by_all(
     )  # fmt: skip
 
 
-Item = tuple[int, float, float, float, bool]
+Item = tuple[int, float, float, float, bool]  # number, yaw, distance, noise; whether dense too
+Found = dict[tuple[int, float, float, float], Numbers]  # by the first four
 
 
 @lru_cache(maxsize=4)
 def fits_of(
     model: FaceModel, item: Item, actual: float, seed: int
 ) -> tuple[View, Fit, ContourFit, Fit | None]:
-    """The photograph of one subject and yaw, and its fits at one distance and prior; whether dense too."""
+    """The photograph of one subject and yaw, and its fits at one distance and prior."""
     number, yaw, distance, noise, dense = item
     view = photograph(model, number, seed, actual, yaw)
     landmarks, contours = by_points(model, view, distance, noise)
@@ -129,50 +136,17 @@ def d_l_percent(found: Fit, seen: Observation, interocular_px: float) -> float:
 
 
 def run_pairs(pair: Pair, settings: Settings, progress: Progress) -> Outcome:
-    """Table, pictures and claims of one of the figures."""
+    """Tables, pictures and claims of one of the figures."""
     model, seed = settings.model, settings.seed
     n = settings.subjects(SUBJECTS, QUICK_SUBJECTS)
-    light = PRIORS[0][1]
-    shown = ((pair.frontal, 0.0), (pair.rotated, YAW))
-    items = [
-        (number, yaw, distance, light, distance == pair.fitted)
-        for yaw in (0.0, YAW)
-        for distance in (pair.fitted, pair.actual)
-        for number in sorted({*range(1, n + 1), *(one for one, turned in shown if turned == yaw)})
-    ]
-    # Those of the pictures last: they are still at hand when they are drawn
-    items += [(*one, pair.fitted, noise, True) for one in shown for _, noise in PRIORS[1:]]
-    work = partial(one_subject, actual=pair.actual, seed=seed)
-    answers = over_subjects(work, items, settings, progress, what="fits")
-    found = {item[:4]: one for item, one in zip(items, answers, strict=True)}
-    faces = tuple(
-        (number, _pose(yaw), prior, *_cells(found[number, yaw, pair.fitted, noise]))
-        for number, yaw in shown
-        for prior, noise in PRIORS
-    )
-    means = tuple(
-        mean_row(found, yaw, distance)
-        for yaw in (0.0, YAW)
-        for distance in (pair.fitted, pair.actual)
-    )
-    columns = tuple(f"{method}, {what}" for method in METHODS for what in ("d_S mm", "d_L %"))
+    found = _found(pair, settings, n, progress)
     among = f"the first {n} and those shown, of {who(settings, max(n, pair.frontal, pair.rotated))}"
-    wrong = f"picture from {100 * pair.actual:.0f} cm, fitted at {100 * pair.fitted:.0f} cm"
-    images = tuple(picture(model, pair, number, yaw, seed) for number, yaw in shown)
     return Outcome(
         pair.name,
         pair.title,
-        (
-            Table(f"The faces shown: {wrong}", ("face", "pose", "prior", *columns), faces, among),
-            Table(
-                "Means over the subjects with the light prior, at the wrong and at the right distance",
-                ("fitted at", "pose", "subjects", *columns, "contours better for"),
-                means,
-                among,
-            ),
-        ),
+        _tables(pair, found, among),
         (),
-        images,
+        tuple(picture(model, pair, number, yaw, seed) for number, yaw in pair.shown),
         claims(pair, found),
         {
             "photograph": f"from {100 * pair.actual:.0f} cm, frontal or turned by {YAW:g} degrees, no noise",
@@ -181,10 +155,46 @@ def run_pairs(pair: Pair, settings: Settings, progress: Progress) -> Outcome:
             "contours": "of the true face, as a perfect edge detector sees them",
             "seed": seed,
         },
+    )
+
+
+def _found(pair: Pair, settings: Settings, n: int, progress: Progress) -> Found:
+    """The first n subjects and those shown at both distances, light prior; and those shown with the other priors."""
+    numbers = {yaw: sorted({*range(1, n + 1), number}) for number, yaw in pair.shown}
+    items = [
+        (number, yaw, distance, PRIORS[0][1], distance == pair.fitted)
+        for yaw in numbers
+        for distance in (pair.fitted, pair.actual)
+        for number in numbers[yaw]
+    ]
+    # Those of the pictures last: they are still at hand when they are drawn
+    items += [(*one, pair.fitted, noise, True) for one in pair.shown for _, noise in PRIORS[1:]]
+    work = partial(one_subject, actual=pair.actual, seed=settings.seed)
+    answers = over_subjects(work, items, settings, progress, what="fits")
+    return {item[:4]: one for item, one in zip(items, answers, strict=True)}
+
+
+def _tables(pair: Pair, found: Found, among: str) -> tuple[Table, Table]:
+    """The faces shown, with every prior; and the means over all subjects."""
+    shown = tuple(
+        (number, _pose(yaw), prior, *_cells(found[number, yaw, pair.fitted, noise]))
+        for number, yaw in pair.shown
+        for prior, noise in PRIORS
+    )
+    means = tuple(
+        mean_row(found, yaw, distance)
+        for yaw in (0.0, YAW)
+        for distance in (pair.fitted, pair.actual)
+    )
+    wrong = f"picture from {100 * pair.actual:.0f} cm, fitted at {100 * pair.fitted:.0f} cm"
+    return (
+        Table(f"The faces shown: {wrong}", ("face", "pose", "prior", *COLUMNS), shown, among),
+        Table(
+            "Means over the subjects with the light prior, at the wrong and at the right distance",
+            ("fitted at", "pose", "subjects", *COLUMNS, "contours better for"),
+            means, among,
+        ),
     )  # fmt: skip
-
-
-Found = dict[tuple[int, float, float, float], Numbers]
 
 
 def _cells(one: Numbers) -> tuple[float | None, ...]:
@@ -223,21 +233,17 @@ def picture(model: FaceModel, pair: Pair, number: int, yaw: float, seed: int) ->
         view.face, distance=pair.actual, scheme=usual_scheme(model), yaw_deg=yaw
     )
     target = portrait(view.face, view.seen, camera)
-    scale = target.shape[1] / size[0]
     matched = contours.fit.vertices()[contours.pairs.vertices]
     at = project(contours.fit.camera, matched) + view.seen.centre
-    pairs = with_pairs(target, scale, view.edges, at, contours.pairs.points)
-    fitted = [
-        portrait(_face(view.face, one), view.seen, one.camera)
-        for one in (landmarks, contours.fit, every)
-    ]
+    pairs = with_pairs(target, target.shape[1] / size[0], view.edges, at, contours.pairs.points)
     fits = (landmarks, contours.fit, every)
+    heads = [_face(view.face, one) for one in fits]
+    fitted = [portrait(one, view.seen, by.camera) for one, by in zip(heads, fits, strict=True)]
     names = [
         f"{way}: {d_s_mm(one, view.face):.1f} mm" for way, one in zip(METHODS, fits, strict=True)
     ]
     far = portrait_camera(view.face, distance=None, scheme=usual_scheme(model), yaw_deg=yaw)
-    heads = (view.face, *(_face(view.face, one) for one in fits))
-    last = [("orthographic", portrait(one, view.seen, far)) for one in heads]
+    last = [("orthographic", portrait(one, view.seen, far)) for one in (view.face, *heads)]
     upper = [("the target", target), *zip(names, fitted, strict=True)]
     lower = [("contours and their pairs", pairs)]
     lower += [("blended with the target", blended(target, one)) for one in fitted]
@@ -257,9 +263,8 @@ def _face(face: Subject, found: Fit) -> Subject:
 def claims(pair: Pair, found: Found) -> tuple[Claim, ...]:
     """The figure's numbers, face by face, and what contours do in the mean."""
     answer = []
-    light = PRIORS[0][1]
-    for k, (number, yaw) in enumerate(((pair.frontal, 0.0), (pair.rotated, YAW))):
-        one = found[(number, yaw, pair.fitted, light)]
+    for k, (number, yaw) in enumerate(pair.shown):
+        one = found[number, yaw, pair.fitted, PRIORS[0][1]]
         ours = ", ".join(f"{s:.2f}/{l:.2f}" for s, l in zip(one["d_s"], one["d_l"], strict=True))
         answer.append(
             Claim(

@@ -26,8 +26,9 @@ MODES = 70
 NOISE_PERCENT = 0.1  # the paper's light prior
 PAPER_COUNT, PAPER_PLAUSIBLE = 50, 7
 FARKAS = "farkas"  # the paper's 70 points are those of Farkas
-# (scheme or "" for the usual one, metres or None for far away, pixels between the eyes, pose)
-KINDS: tuple[tuple[str, float | None, float, str], ...] = (
+# Scheme or "" for the usual one, metres or None for far away, pixels between the eyes, pose
+Kind = tuple[str, float | None, float, str]
+KINDS: tuple[Kind, ...] = (
     ("", None, 100.0, "fixed"),
     ("", None, 50.0, "fixed"),
     ("", None, 200.0, "fixed"),
@@ -39,64 +40,23 @@ KINDS: tuple[tuple[str, float | None, float, str], ...] = (
 )
 COUNTED = ("kept", "plausible", "plausible_upper", "plausible_faces")
 
+Row = tuple[str | float, ...]
+
 
 def run(settings: Settings, progress: Progress) -> Outcome:
-    """The counts of every kind of picture, means over the subjects, and the first modes' movements."""
+    """The counts of every kind of picture, means over the subjects, and the first kind's movements."""
     model = settings.model
     n = settings.subjects(SUBJECTS, QUICK_SUBJECTS)
-    usual = usual_scheme(model)
-    kinds = [kind for kind in KINDS if (kind[0] or usual) in model.schemes]
-    items = [(number, *kind) for kind in kinds for number in range(1, n + 1)]
-    answers = over_subjects(
-        partial(counted, seed=settings.seed), items, settings, progress, what="fits"
-    )
-    rows = []
-    for k, (scheme, distance, px, pose) in enumerate(kinds):
-        part = answers[k * n : (k + 1) * n]
-        means = [float(np.mean([one[name] for one in part])) for name in COUNTED]
-        name = scheme or usual
-        camera = "orthographic" if distance is None else f"{100 * distance:.0f} cm"
-        points = f"{name}, {len(model.schemes[name])} points"
-        rows.append((points, camera, px, pose, *means))
-    first = answers[:n]
-    moved = np.mean([one["moved_px"] for one in first], axis=0)
-    size = np.mean([one["size"] for one in first], axis=0)
-    x = tuple(float(k + 1) for k in range(len(moved)))
+    found = _found(settings, n, progress)
+    rows = [row(model, kind, subjects) for kind, subjects in found.items()]
+    first = next(iter(found.values()))
     modes = int(min(MODES, model.n_modes))
     low, high = first[0]["range"].tolist()
     return Outcome(
         "counts",
         EXPERIMENT.title,
-        (
-            Table(
-                f"Flexibility modes of {modes} that move the surface by {SURFACE_MM:g} mm "
-                f"and the landmarks by less than {LANDMARK_PX:g} px",
-                (
-                    "landmarks", "camera", "px between the eyes", "pose", "kept",
-                    "plausible: |w f| within 3 sd", "|w f| not above", "|alpha +- w f| not above",
-                ),
-                tuple(rows),
-                f"means over {who(settings, n)}; 3 sd is {low:.2f} to {high:.2f}",
-            ),
-        ),
-        (
-            Chart(
-                f"Modes at {SURFACE_MM:g} mm of mean surface change", "mode", "landmarks, px",
-                (
-                    Line("mean movement", x, tuple(moved.tolist())),
-                    Line("allowed", x, (LANDMARK_PX,) * len(x)),
-                ),
-            ),
-            Chart(
-                "Length of the change in standard deviations", "mode", "|w f|",
-                (
-                    Line("|w f|", x, tuple(size.tolist())),
-                    Line("most of a face", x, (high,) * len(x)),
-                    Line("least of a face", x, (low,) * len(x)),
-                ),
-                log_y=True,
-            ),
-        ),
+        (table(rows, modes, f"means over {who(settings, n)}; 3 sd is {low:.2f} to {high:.2f}"),),
+        (movement_chart(first), length_chart(first)),
         (),
         claims(rows, modes),
         {
@@ -104,7 +64,17 @@ def run(settings: Settings, progress: Progress) -> Outcome:
             "view": "frontal, no noise",
             "fit": f"{modes} modes, box 2 sd, prior of {NOISE_PERCENT:g} % noise",
         },
-    )  # fmt: skip
+    )
+
+
+def _found(settings: Settings, n: int, progress: Progress) -> dict[Kind, list[Numbers]]:
+    """The counts of n subjects, of every kind of picture whose landmarks the model has."""
+    usual = usual_scheme(settings.model)
+    kinds = [kind for kind in KINDS if (kind[0] or usual) in settings.model.schemes]
+    items = [(number, *kind) for kind in kinds for number in range(1, n + 1)]
+    work = partial(counted, seed=settings.seed)
+    answers = over_subjects(work, items, settings, progress, what="fits")
+    return {kind: answers[k * n : (k + 1) * n] for k, kind in enumerate(kinds)}
 
 
 def counted(
@@ -134,7 +104,60 @@ def counted(
     }
 
 
-def claims(rows: list[tuple[str | float, ...]], modes: int) -> tuple[Claim, ...]:
+def row(model: FaceModel, kind: Kind, subjects: list[Numbers]) -> Row:
+    """A kind of picture and its counts, means over the subjects."""
+    scheme, distance, px, pose = kind
+    name = scheme or usual_scheme(model)
+    points = f"{name}, {len(model.schemes[name])} points"
+    camera = "orthographic" if distance is None else f"{100 * distance:.0f} cm"
+    means = [float(np.mean([one[count] for one in subjects])) for count in COUNTED]
+    return (points, camera, px, pose, *means)
+
+
+def table(rows: list[Row], modes: int, note: str) -> Table:
+    """What is kept of `modes` modes, and what of it is plausible by each count."""
+    return Table(
+        f"Flexibility modes of {modes} that move the surface by {SURFACE_MM:g} mm "
+        f"and the landmarks by less than {LANDMARK_PX:g} px",
+        (
+            "landmarks", "camera", "px between the eyes", "pose", "kept",
+            "plausible: |w f| within 3 sd", "|w f| not above", "|alpha +- w f| not above",
+        ),
+        tuple(rows),
+        note,
+    )  # fmt: skip
+
+
+def movement_chart(subjects: list[Numbers]) -> Chart:
+    """How far each mode moves the landmarks, beside what is allowed."""
+    moved = np.mean([one["moved_px"] for one in subjects], axis=0)
+    x = tuple(float(k + 1) for k in range(len(moved)))
+    return Chart(
+        f"Modes at {SURFACE_MM:g} mm of mean surface change", "mode", "landmarks, px",
+        (
+            Line("mean movement", x, tuple(moved.tolist())),
+            Line("allowed", x, (LANDMARK_PX,) * len(x)),
+        ),
+    )  # fmt: skip
+
+
+def length_chart(subjects: list[Numbers]) -> Chart:
+    """How long each mode's change is, between the lengths of a face."""
+    size = np.mean([one["size"] for one in subjects], axis=0)
+    low, high = subjects[0]["range"].tolist()
+    x = tuple(float(k + 1) for k in range(len(size)))
+    return Chart(
+        "Length of the change in standard deviations", "mode", "|w f|",
+        (
+            Line("|w f|", x, tuple(size.tolist())),
+            Line("most of a face", x, (high,) * len(x)),
+            Line("least of a face", x, (low,) * len(x)),
+        ),
+        log_y=True,
+    )  # fmt: skip
+
+
+def claims(rows: list[Row], modes: int) -> tuple[Claim, ...]:
     """The paper's two numbers."""
     kept, plausible, faces = (float(value) for value in (rows[0][4], rows[0][5], rows[0][7]))
     return (

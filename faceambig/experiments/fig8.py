@@ -84,38 +84,22 @@ def run(settings: Settings, progress: Progress) -> Outcome:
         found.append(statistics(one))
         progress(Step("sets of points", len(found), len(seen)))
     n = len(seen[0].z[0])
-    rows = tuple(
-        (
-            one.name, n, float(s.same[-1].mean()), float(s.near.mean()), float(s.far.mean()),
-            100 * float((s.near < s.same[-1]).mean()), s.closest[2], 100 * s.found,
-        )
-        for one, s in zip(seen, found, strict=True)
-    )  # fmt: skip
-    near, far = (f"{100 * d:.0f} cm" for d in seen[0].distances[[0, -1]])
-    table = Table(
-        "Landmarks of people in two pictures, mean distance in percent of the distance of the eyes",
-        (
-            "points", "people", f"same person, {near} and {far}", f"nearest other, both {near}",
-            f"nearest other, both {far}", "% of people nearer to another than to themselves",
-            f"closest two people across {near} and {far}", "% whose own picture is the closest",
-        ),
-        rows,
-        "published archive" if archive else "random people of the model; the archive itself is not redistributed here",
-    )  # fmt: skip
+    if archive:
+        people, noise, note = f"{n} of {archive}", "the archive's own", "published archive"
+    else:
+        people = f"{n}, drawn from all modes, seed {settings.seed}"
+        noise = f"none, or {NOISE_PERCENT:g} % per coordinate"
+        note = "random people of the model; the archive itself is not redistributed here"
     return Outcome(
         "fig8",
         EXPERIMENT.title,
-        (table,),
+        (table(seen, found, note),),
         (chart(seen[0], found[0]),),
         (picture(seen[0], found[0]),),
         claims(seen, found, bool(archive)),
         {
-            "people": f"{n} of {archive}"
-            if archive
-            else f"{n}, drawn from all modes, seed {settings.seed}",
-            "noise": "the archive's own"
-            if archive
-            else f"none, or {NOISE_PERCENT:g} % per coordinate",
+            "people": people,
+            "noise": noise,
             "compared": "after the best shift, turn and scale; percent of the distance of the eyes",
         },
     )
@@ -197,6 +181,29 @@ def statistics(seen: Seen) -> Statistics:
     np.fill_diagonal(across, np.inf)
     i, j = divmod(int(across.argmin()), len(across))
     return Statistics(same, others[0], others[1], found, (i, j, float(across[i, j])))
+
+
+def table(seen: tuple[Seen, ...], found: list[Statistics], note: str) -> Table:
+    """The paper's numbers, a row for each set of points."""
+    n = len(seen[0].z[0])
+    rows = tuple(
+        (
+            one.name, n, float(s.same[-1].mean()), float(s.near.mean()), float(s.far.mean()),
+            100 * float((s.near < s.same[-1]).mean()), s.closest[2], 100 * s.found,
+        )
+        for one, s in zip(seen, found, strict=True)
+    )  # fmt: skip
+    near, far = (f"{100 * d:.0f} cm" for d in seen[0].distances[[0, -1]])
+    return Table(
+        "Landmarks of people in two pictures, mean distance in percent of the distance of the eyes",
+        (
+            "points", "people", f"same person, {near} and {far}", f"nearest other, both {near}",
+            f"nearest other, both {far}", "% of people nearer to another than to themselves",
+            f"closest two people across {near} and {far}", "% whose own picture is the closest",
+        ),
+        rows,
+        note,
+    )  # fmt: skip
 
 
 def chart(seen: Seen, found: Statistics) -> Chart:

@@ -40,6 +40,7 @@ from .protocol import (
     Step,
     Table,
 )
+from .recognition import Estimates, Recognised, nearness, recognised
 from .regressor import asked, load_regressor, square
 
 PEOPLE, QUICK_PEOPLE = 53, 20
@@ -50,14 +51,7 @@ EYES_PX = 100.0
 MEASURED = 400  # vertices, evenly from those d_S is measured on: 11,000 pairs of faces
 KNOWN, TAKEN, FREE = "known distance", f"{100 * ASSUMED:.0f} cm for all", "free distance"
 
-
-class Estimates(NamedTuple):
-    """Shapes of n people from both distances, by one method."""
-
-    name: str
-    near: Array  # (n, D) vectors of shape
-    far: Array  # (n, D)
-    faces: Array | None  # (2n, V, 3) metres, near first; None: the method gives no surface
+Row = tuple[str | int | float | None, ...]
 
 
 class Pictures(NamedTuple):
@@ -73,60 +67,46 @@ class Pictures(NamedTuple):
 
 def run(settings: Settings, progress: Progress) -> Outcome:
     """Every method's distances and curve."""
-    if "archive" in settings.extra:
+    archive = "archive" in settings.extra
+    if archive:
         sets = [archived(settings)]
     else:
         sets = [synthetic(settings, noise) for noise in (CAREFUL, DETECTOR)]
-    total = 3 * len(sets) + ("regressor" in settings.extra)
-    rows, curves, images, done = [], [], [], 0
-    for pictures in sets:
-        for one in estimated(settings, pictures, last=pictures is sets[-1]):
-            done += 1
-            progress(Step("methods", done, total))
-            false, true = roc(cosines(one.near, one.far))
-            distances = None if one.faces is None else apart_mm(one.faces)
-            noise = (
-                None if one.faces is None or "archive" in settings.extra else pictures.noise_percent
-            )
-            rows.append((one.name, noise, len(one.near), area(false, true), *numbers(distances)))
-            if pictures is sets[-1]:
-                words = f"{one.name}: area {area(false, true):.3f}"
-                curves.append(Line(words, tuple(false.tolist()), tuple(true.tolist())))
-            if pictures is sets[0] and distances is not None and one.name != FREE:
-                images.append(picture(one.name, distances, pictures.distances))
-    pictures = sets[-1]
-    a, b = (f"{100 * d:.0f} cm" for d in pictures.distances)
+    found = _found(settings, sets, progress)
+    # Nobody knows by how much an archive's landmarks are off
+    noises = [None if archive else pictures.noise_percent for pictures in sets]
+    rows = [_row(one, noise) for noise, by in zip(noises, found, strict=True) for one in by]
     return Outcome(
         "fig9",
         EXPERIMENT.title,
-        (
-            Table(
-                f"Shapes estimated from {a} and from {b}",
-                (
-                    "method", "landmark noise, %", "people", "area under the curve", "same person, mm",
-                    f"nearest other, both {a}, mm", f"nearest other, both {b}, mm",
-                ),
-                tuple(rows),
-                f"{pictures.people}; rigid mean distance over {MEASURED} vertices; area: between cosines",
-                decimals=3,
-            ),
+        (table(rows, sets[-1]),),
+        (chart(found[-1], sets[-1]),),
+        tuple(
+            picture(one.name, one.distances, sets[0].distances)
+            for one in found[0]
+            if one.distances is not None and one.name != FREE
         ),
-        (
-            Chart(
-                f"Recognising a person from {a} at {b}, {pictures.source}", "false positives", "true positives",
-                tuple(curves),
-            ),
-        ),
-        tuple(images),
         claims(rows),
         {
-            "people": f"{len(pictures.near)}; {pictures.people}",
+            "people": f"{len(sets[-1].near)}; {sets[-1].people}",
             "fit": "70 modes, box 2 sd, a prior that knows the noise",
             "recognised": "by the cosine between the shapes' coefficients",
             **settings.extra,
             "seed": settings.seed,
         },
-    )  # fmt: skip
+    )
+
+
+def _found(settings: Settings, sets: list[Pictures], progress: Progress) -> list[list[Recognised]]:
+    """What every method gives, of each set of pictures."""
+    total = 3 * len(sets) + ("regressor" in settings.extra)
+    found: list[list[Recognised]] = []
+    for pictures in sets:
+        found.append([])
+        for one in estimated(settings, pictures, last=pictures is sets[-1]):
+            progress(Step("methods", sum(map(len, found)) + 1, total))
+            found[-1].append(recognised(one))
+    return found
 
 
 def estimated(settings: Settings, pictures: Pictures, *, last: bool) -> Iterator[Estimates]:
@@ -214,61 +194,51 @@ def regressed(settings: Settings, pictures: Pictures) -> Estimates:
     return Estimates(f"network {net.name}", near, far, None)
 
 
-def cosines(near: Array, far: Array) -> Array:
-    """(n, n) cosine between the vectors of everyone from near and everyone from far."""
-    a, b = (x / np.linalg.norm(x, axis=1, keepdims=True) for x in (near, far))
-    return a @ b.T
+def _row(one: Recognised, noise: float | None) -> Row:
+    if one.distances is None:  # a network, which sees no landmarks either
+        return (one.name, None, one.n, one.area, None, None, None)
+    return (one.name, noise, one.n, one.area, *nearness(one.distances))
 
 
-def roc(score: Array) -> tuple[Array, Array]:
-    """Shares of false and of true positives (m,) as the threshold on score (n, n) falls; the diagonal is true."""
-    true = np.eye(len(score), dtype=bool).ravel()
-    values = score.ravel()
-    order = np.argsort(-values, kind="stable")
-    steps = np.flatnonzero(np.diff(values[order], append=-np.inf))  # ties are passed together
-    hit, miss = np.cumsum(true[order])[steps], np.cumsum(~true[order])[steps]
-    start = np.zeros(1)
-    return np.concatenate([start, miss / (~true).sum()]), np.concatenate([start, hit / true.sum()])
+def table(rows: list[Row], pictures: Pictures) -> Table:
+    """Every method and noise."""
+    a, b = _ends(pictures.distances)
+    return Table(
+        f"Shapes estimated from {a} and from {b}",
+        (
+            "method", "landmark noise, %", "people", "area under the curve", "same person, mm",
+            f"nearest other, both {a}, mm", f"nearest other, both {b}, mm",
+        ),
+        tuple(rows),
+        f"{pictures.people}; rigid mean distance over {MEASURED} vertices; area: between cosines",
+        decimals=3,
+    )  # fmt: skip
 
 
-def area(false: Array, true: Array) -> float:
-    """Area under the curve: how often one's own picture scores above another's."""
-    return float(np.trapezoid(true, false))
+def chart(found: list[Recognised], pictures: Pictures) -> Chart:
+    """The methods' curves of one set of pictures."""
+    a, b = _ends(pictures.distances)
+    lines = tuple(
+        Line(f"{one.name}: area {one.area:.3f}", tuple(one.false.tolist()), tuple(one.true.tolist()))
+        for one in found
+    )  # fmt: skip
+    return Chart(
+        f"Recognising a person from {a} at {b}, {pictures.source}", "false positives", "true positives", lines
+    )  # fmt: skip
 
 
-def apart_mm(faces: Array) -> Array:
-    """(m, m) mean distance, mm, of corresponding vertices of faces (m, V, 3) after the best rigid motion."""
-    X = faces - faces.mean(axis=1, keepdims=True)
-    apart = np.zeros((len(X), len(X)))
-    for i, face in enumerate(X):
-        U, _, Vt = np.linalg.svd(np.einsum("vk,nvl->nkl", face, X[i:]))
-        U[:, :, 2] *= np.sign(np.linalg.det(U @ Vt))[:, None]
-        gap = face @ (U @ Vt) - X[i:]
-        apart[i, i:] = apart[i:, i] = 1e3 * np.linalg.norm(gap, axis=2).mean(axis=1)
-    return apart
-
-
-def numbers(distances: Array | None) -> tuple[float | None, float | None, float | None]:
-    """Same person from both distances; nearest other from near, from far; mm, means."""
-    if distances is None:
-        return None, None, None
-    n = len(distances) // 2
-    same = float(np.diag(distances[:n, n:]).mean())
-    others = []
-    for part in (distances[:n, :n], distances[n:, n:]):
-        masked = np.where(np.eye(n, dtype=bool), np.inf, part)
-        others.append(float(masked.min(axis=1).mean()))
-    return same, others[0], others[1]
+def _ends(distances: tuple[float, float]) -> tuple[str, str]:
+    near, far = distances
+    return f"{100 * near:.0f} cm", f"{100 * far:.0f} cm"
 
 
 def picture(name: str, distances: Array, ends: tuple[float, float]) -> Image:
     """The matrix, dark is near; and where two faces are nearer than a person to themselves in the mean."""
-    same = numbers(distances)[0]
-    assert same is not None
+    same = nearness(distances).same
     cell = max(1, round(420 / len(distances)))
     grey = matrix(distances, 0.0, float(distances.max()), cell)
     black = matrix((distances >= same).astype(np.float64), 0.0, 1.0, cell)
-    a, b = (f"{100 * d:.0f} cm" for d in ends)
+    a, b = _ends(ends)
     words = (
         f"{name}: distances of everybody's faces, first from {a}, then from {b}; black 0, white "
         f"{distances.max():.1f} mm. Right: black where they are nearer than {same:.2f} mm, a person from {a} and {b}"
@@ -278,7 +248,7 @@ def picture(name: str, distances: Array, ends: tuple[float, float]) -> Image:
     )
 
 
-def claims(rows: list[tuple[str | int | float | None, ...]]) -> tuple[Claim, ...]:
+def claims(rows: list[Row]) -> tuple[Claim, ...]:
     """Figure 11's order of the methods, at the last noise; Figure 9's of the distances, at the first."""
     careful = {str(row[0]): row for row in reversed(rows)}
     detector = {str(row[0]): row for row in rows}

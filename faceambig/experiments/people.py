@@ -6,6 +6,8 @@ far. A person's own two pictures do not care how many others there are, the near
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ..arrays import Array
@@ -32,56 +34,36 @@ CANDIDATES = 12  # by the root mean square; of them the nearest by the mean dist
 NOISE_PERCENT = (0.0, 1.0)
 
 
+class Grown(NamedTuple):
+    """What holds of the first people of a crowd."""
+
+    same: float  # percent of the eyes' distance: a person from near and from far
+    near: float  # the nearest other, both from near
+    far: float  # both from far
+    nearer: float  # % of people nearer to another than to themselves
+    recognised: float  # % whose own picture is the closest
+
+
+Found = dict[float, dict[int, Grown]]  # by noise, then by the number of people
+Row = tuple[str | int | float, ...]
+
+
 def run(settings: Settings, progress: Progress) -> Outcome:
     """Both pictures of everyone, with and without noise; nearest others among the first n."""
-    model = settings.model
-    most = max(4, settings.subjects(NUMBERS[-1], QUICK[-1]))
-    numbers = (*(n for n in (QUICK if settings.quick else NUMBERS) if n < most), most)
-    if len(numbers) < 2:
-        numbers = (most // 2, most)
+    model, numbers = settings.model, _numbers(settings)
     scheme, points = point_sets(model)[0]
     at = surface_points(model, scheme, random_people(model, numbers[-1], settings.seed))
-    rows, lines = [], []
-    for k, noise in enumerate(NOISE_PERCENT):
+    found: Found = {}
+    for noise in NOISE_PERCENT:
         near, far = _pictures(at, points, noise, settings.seed)
-        found = [grown(near, far, n) for n in numbers]
-        rows += [(f"{noise:g} %", n, *one) for n, one in zip(numbers, found, strict=True)]
-        words = "no noise" if noise == 0 else f"noise {noise:g} %"
-        x = tuple(map(float, numbers))
-        lines.append([Line(words, x, tuple(one[column] for one in found)) for column in (1, 3, 4)])
-        progress(Step("kinds of pictures", k + 1, len(NOISE_PERCENT)))
-    table = Table(
-        f"Landmarks in two pictures ({points.name}), mean distance in percent of the distance of the eyes",
-        (
-            "noise", "people", f"same person, {100 * NEAR:.0f} and {100 * FAR:.0f} cm",
-            f"nearest other, both {100 * NEAR:.0f} cm", f"nearest other, both {100 * FAR:.0f} cm",
-            "% of people nearer to another than to themselves", "% whose own picture is the closest",
-        ),
-        tuple(rows),
-        f"of the first {ASKED} people at most; the others are those they may be taken for",
-    )  # fmt: skip
+        found[noise] = {n: grown(near, far, n) for n in numbers}
+        progress(Step("kinds of pictures", len(found), len(NOISE_PERCENT)))
+    rows = [(f"{noise:g} %", n, *one) for noise, by in found.items() for n, one in by.items()]
     return Outcome(
         "people",
         EXPERIMENT.title,
-        (table,),
-        (
-            Chart(
-                f"The nearest other person, both from {100 * NEAR:.0f} cm",
-                "people",
-                "mean landmark distance in %",
-                tuple(line[0] for line in lines),
-                log_x=True,
-            ),
-            Chart(
-                "Share of people", "people", "%",
-                tuple(
-                    Line(f"{words}, {each.label}", each.x, each.y)
-                    for line in lines
-                    for words, each in zip(("nearer to another", "recognised"), line[1:], strict=True)
-                ),
-                log_x=True,
-            ),
-        ),
+        (table(rows, points),),
+        (nearest_chart(found), share_chart(found)),
         (),
         claims(rows, len(numbers)),
         {
@@ -89,7 +71,14 @@ def run(settings: Settings, progress: Progress) -> Outcome:
             "points": points.name,
             "compared": "after the best shift, turn and scale",
         },
-    )  # fmt: skip
+    )
+
+
+def _numbers(settings: Settings) -> tuple[int, ...]:
+    """How many people there are, two numbers at least; the last is as many as were asked for."""
+    most = max(4, settings.subjects(NUMBERS[-1], QUICK[-1]))
+    fewer = tuple(n for n in (QUICK if settings.quick else NUMBERS) if n < most)
+    return (*(fewer or (most // 2,)), most)
 
 
 def _pictures(at: Array, points: Points, noise: float, seed: int) -> tuple[Crowd, Crowd]:
@@ -102,18 +91,18 @@ def _pictures(at: Array, points: Points, noise: float, seed: int) -> tuple[Crowd
     return near, far
 
 
-def grown(near: Crowd, far: Crowd, n: int) -> tuple[float, float, float, float, float]:
-    """Of n people: same person, nearest other near, far, % nearer to another, % whose own picture is the closest."""
+def grown(near: Crowd, far: Crowd, n: int) -> Grown:
+    """The numbers of the first n people."""
     asked = min(ASKED, n)
     own = apart_percent(near.of(slice(asked)), far.of(slice(asked)))
     others = [nearest(each.of(slice(asked)), each.of(slice(n))) for each in (near, far)]
     across = nearest(near.of(slice(asked)), far.of(slice(n)))
-    return (
-        float(own.mean()),
-        float(others[0].mean()),
-        float(others[1].mean()),
-        100 * float((others[0] < own).mean()),
-        100 * float((own <= across).mean()),
+    return Grown(
+        same=float(own.mean()),
+        near=float(others[0].mean()),
+        far=float(others[1].mean()),
+        nearer=100 * float((others[0] < own).mean()),
+        recognised=100 * float((own <= across).mean()),
     )
 
 
@@ -127,7 +116,52 @@ def nearest(asked: Crowd, crowd: Crowd) -> Array:
     return np.min(exact, axis=0)
 
 
-def claims(rows: list[tuple[str | int | float, ...]], numbers: int) -> tuple[Claim, ...]:
+def table(rows: list[Row], points: Points) -> Table:
+    """Every number of people, without and with noise."""
+    return Table(
+        f"Landmarks in two pictures ({points.name}), mean distance in percent of the distance of the eyes",
+        (
+            "noise", "people", f"same person, {100 * NEAR:.0f} and {100 * FAR:.0f} cm",
+            f"nearest other, both {100 * NEAR:.0f} cm", f"nearest other, both {100 * FAR:.0f} cm",
+            "% of people nearer to another than to themselves", "% whose own picture is the closest",
+        ),
+        tuple(rows),
+        f"of the first {ASKED} people at most; the others are those they may be taken for",
+    )  # fmt: skip
+
+
+def nearest_chart(found: Found) -> Chart:
+    """The nearest other from near as the people grow in number, a line for each noise."""
+    lines = (
+        Line(_words(noise), tuple(map(float, by)), tuple(one.near for one in by.values()))
+        for noise, by in found.items()
+    )
+    return Chart(
+        f"The nearest other person, both from {100 * NEAR:.0f} cm",
+        "people",
+        "mean landmark distance in %",
+        tuple(lines),
+        log_x=True,
+    )
+
+
+def share_chart(found: Found) -> Chart:
+    """Who is nearer to another, and who is recognised, two lines for each noise."""
+    lines = []
+    for noise, by in found.items():
+        x, words = tuple(map(float, by)), _words(noise)
+        nearer = tuple(one.nearer for one in by.values())
+        recognised = tuple(one.recognised for one in by.values())
+        lines.append(Line(f"nearer to another, {words}", x, nearer))
+        lines.append(Line(f"recognised, {words}", x, recognised))
+    return Chart("Share of people", "people", "%", tuple(lines), log_x=True)
+
+
+def _words(noise: float) -> str:
+    return "no noise" if noise == 0 else f"noise {noise:g} %"
+
+
+def claims(rows: list[Row], numbers: int) -> tuple[Claim, ...]:
     """Growth from the least to the greatest number of people, of each kind of picture."""
     answer = []
     for first in range(0, len(rows), numbers):

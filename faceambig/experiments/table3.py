@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import partial
 from typing import Any
 
@@ -155,25 +156,47 @@ def _fig5(settings: Settings, actual: float) -> Image:
 
 
 def _claims(means: dict[str, Array], each: dict[str, Array]) -> tuple[Claim, ...]:
-    d_l, d_s, scaled = means["d_l"], means["d_s"], means["d_s_scaled"]
+    within, almost = _landmark_claims(means["d_l"], each["d_l"].max())
+    return (within, *_place_claims(means), *_size_claims(means), almost)
+
+
+def _both(values: Iterable[str]) -> str:
+    """A number of each prior, in words."""
+    return "{} (light prior), {} (default)".format(*values)
+
+
+def _landmark_claims(d_l: Array, largest: float) -> tuple[Claim, Claim]:
+    """What the picture tells of the distance: hardly anything."""
     worst = d_l.max(axis=(1, 2))
-    nearest = np.abs(d_s.argmin(axis=2) - np.arange(len(DISTANCES))).max(axis=1)
-    growth = d_s[:, 0, 3] / d_s[:, 0, 0]
-    corners = [f"{d_s[k, 0, 4]:.1f} and {d_s[k, 4, 0]:.1f} mm" for k in (LIGHT, DEFAULT)]
     ratio = d_l[:, 0, 1] / d_l[:, 0, 0]
-    on = "{} (light prior), {} (default)".format
     return (
         Claim(
             "a wrong distance explains the landmarks within what a person can click, 3 %",
             "largest mean 0.47 %",
-            on(*(f"{value:.2f} %" for value in worst)),
+            _both(f"{value:.2f} %" for value in worst),
             bool((worst < HUMAN_TOLERANCE_PERCENT).all()),
-            f"largest of the means; of single heads {each['d_l'].max():.2f} %.",
+            f"largest of the means; of single heads {largest:.2f} %.",
         ),
+        Claim(
+            "the wrong distance explains the landmarks almost as well as the right one",
+            "0.21 to 0.24 % (30 cm fitted at 60)",
+            _both(f"{d_l[k, 0, 0]:.2f} to {d_l[k, 0, 1]:.2f} %" for k in (LIGHT, DEFAULT)),
+            bool(ratio[LIGHT] < 1.5),
+            "Modes that would follow reach the box: the tighter the model, the more of the error stays in the picture.",
+        ),
+    )
+
+
+def _place_claims(means: dict[str, Array]) -> tuple[Claim, Claim]:
+    """Where in a row the surface is nearest, and how fast it goes away from there."""
+    d_s = means["d_s"]
+    nearest = np.abs(d_s.argmin(axis=2) - np.arange(len(DISTANCES))).max(axis=1)
+    growth = d_s[:, 0, 3] / d_s[:, 0, 0]
+    return (
         Claim(
             "the surface is nearest where the distance is right",
             "the row's least d_S is on the diagonal",
-            on(*("on it" if off == 0 else f"at most {off} column off" for off in nearest)),
+            _both("on it" if off == 0 else f"at most {off} column off" for off in nearest),
             bool(nearest[DEFAULT] <= 1),
             "Asked within one column and for the default prior: the paper's own columns 120, 240 and "
             "ortho differ by hundredths of a millimetre.",
@@ -181,34 +204,35 @@ def _claims(means: dict[str, Array], each: dict[str, Array]) -> tuple[Claim, ...
         Claim(
             "a face taken from 30 cm and fitted at 240 cm is farther from the truth than fitted at 30 cm",
             "2.01 times (14.55 against 7.23 mm)",
-            on(*(f"{value:.2f} times" for value in growth)),
+            _both(f"{value:.2f} times" for value in growth),
             bool(growth[DEFAULT] > 1.5),
             _growth_words(growth, means["on_box"]),
         ),
+    )
+
+
+def _size_claims(means: dict[str, Array]) -> tuple[Claim, Claim]:
+    """How far off the table's corners are, and which of the two is farther."""
+    d_s, scaled = means["d_s"], means["d_s_scaled"]
+    corners = _both(f"{d_s[k, 0, 4]:.1f} and {d_s[k, 4, 0]:.1f} mm" for k in (LIGHT, DEFAULT))
+    return (
         Claim(
             "surfaces differ by over a centimetre",
             "14.5 mm (30 cm as ortho), 11.0 mm (ortho as 30 cm)",
-            on(*corners),
+            corners,
             bool(max(d_s[DEFAULT].max(), d_s[LIGHT].max()) > 10),
             "A question of the model: how far its modes reach within 2 sd, and whether ears are among the landmarks.",
         ),
         Claim(
             "a near face fitted far comes out worse than a far face fitted near",
             "14.5 against 11.0 mm",
-            on(*corners),
+            corners,
             bool(d_s[DEFAULT, 0, 4] > d_s[DEFAULT, 4, 0]),
             f"After Procrustes with scale it is {scaled[DEFAULT, 0, 4]:.1f} against {scaled[DEFAULT, 4, 0]:.1f} mm "
             "(default prior): a face fitted at a wrong distance comes out too small, and which of the two more so is a "
             "matter of the model.",
         ),
-        Claim(
-            "the wrong distance explains the landmarks almost as well as the right one",
-            "0.21 to 0.24 % (30 cm fitted at 60)",
-            on(*(f"{d_l[k, 0, 0]:.2f} to {d_l[k, 0, 1]:.2f} %" for k in (LIGHT, DEFAULT))),
-            bool(ratio[LIGHT] < 1.5),
-            "Modes that would follow reach the box: the tighter the model, the more of the error stays in the picture.",
-        ),
-    )  # fmt: skip
+    )
 
 
 def _growth_words(growth: Array, on_box: Array) -> str:
