@@ -4,9 +4,10 @@ What is minimised is in problem.py. One step: H = J^T J + lambda I_alpha,
 g = J^T e - lambda alpha, the box QP of the linearised problem, then backtracking along the step (the box is convex, so
 every point of it is feasible). Eliminating the linear unknowns from this step *is* Kaufman's step of the paper's SNLS.
 
-Damping mu stays 0 unless steps shorter than 0.3 are needed. Convergence is tested only with mu = 0 and the QP solved:
-a small predicted decrease under damping was once taken for convergence 3e-4 above the optimum (MATH.md 3 b). Near the
-optimum H hardly changes: the last steps keep it and renew g alone, which needs no J (a fifth of the time of a fit).
+Damping mu stays 0 unless steps shorter than 0.3 are needed. Converged means that the undamped step, its QP solved,
+promises nothing: a small promise under damping was once taken for convergence 3e-4 above the optimum (MATH.md 3 b).
+Near the optimum H hardly changes: the last steps keep it and renew g alone, which needs no J (a fifth of the time of a
+fit).
 
 `descent` is the method and asks for what it needs: the cost at a trial, H and g at a point. `solve` answers for one
 face, `batch.solve_together` for many at once, so both give the same fits.
@@ -131,11 +132,18 @@ def descent(
         slope, predicted = 2 * gd, 2 * promised
         if mu > 0:
             predicted += mu * float(np.diag(H) @ delta**2)  # of the quadratic without damping
-        if mu == 0 and solved and predicted <= tolerance * point.cost + rounding:
+        enough = tolerance * point.cost + rounding
+        if mu == 0 and solved and predicted <= enough:
             if predicted > 0.1 * tolerance * point.cost + rounding:  # the step is known: take it
                 new = yield Trial(point, delta, 1.0)
                 point = new if new.cost < point.cost else point
             return solution_at(problem, point, step, Status.CONVERGED)
+        if (
+            mu > 0 and predicted <= enough
+        ):  # a damped step always promises less than an undamped one
+            undamped = yield from _undamped(H, g, lowest - here, highest - here)
+            if undamped <= enough:
+                return solution_at(problem, point, step, Status.CONVERGED)
         moved = yield from _line_search(point, delta, slope)
         if moved is None:
             whole = False
@@ -155,6 +163,16 @@ def descent(
         else:
             mu = mu / 10 if mu > FIRST_DAMPING else 0.0
     return solution_at(problem, point, max_steps, Status.MAX_STEPS)
+
+
+def _undamped(H: Array, g: Array, low: Array, high: Array) -> Generator[Pass, Any, float]:
+    """The decrease of E that the step without damping promises; inf where there is none."""
+    try:
+        nothing_held = np.zeros(len(g), dtype=np.int8)
+        step = yield from box_qp(H, g, low, high, nothing_held, QP_ROUNDS, {}, False)
+    except np.linalg.LinAlgError:
+        return np.inf
+    return 2 * step.promised if step.solved else np.inf
 
 
 def solution_at(problem: Problem, point: Point, steps: int, status: Status) -> Solution:
