@@ -22,6 +22,7 @@ import subprocess
 import sys
 import threading
 import time
+import tomllib
 from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
@@ -39,8 +40,21 @@ EVERY = 5.0  # seconds between two samples
 SETTLED = 0.2  # of the time: until then caches fill
 PATIENCE = 60.0  # seconds until an answer counts as none
 COUNTED = ("rss_mb", "descriptors", "threads", "tasks", "rooms", "blocks", "answer_ms")
+# Of each language: some people choose another
+TEXTS = [
+    tomllib.loads(path.read_text(encoding="utf-8"))
+    for path in sorted((Path(__file__).resolve().parents[1] / "assets" / "text").glob("*.toml"))
+]
+# Label and button by which everything is as it was
+RESETS = {text["field"]["history"]: text["action"]["reset"] for text in TEXTS}
 # Left alone: hidden from view, made of a person's own photograph, or a minute's work of one line for all
-LEFT_OUT = ("Save it as", "Save the picture", "Find the points", "What moves")
+LEFT_OUT = tuple(
+    text[section][name]
+    for text in TEXTS
+    for section, name in (
+        ("own", "find"), ("export", "save_picture"), ("export", "what"), ("export", "save_moving"),
+    )
+)  # fmt: skip
 
 
 # ---------------------------------------------------------------- the server's process
@@ -181,7 +195,12 @@ def command(_person: Person, wire: Wire, rng: random.Random) -> None:
 
 def reset(_person: Person, wire: Wire, _rng: random.Random) -> None:
     """Back to the first state, so that no browser stays where all is slow."""
-    wire.set(wire.control("ButtonGroup", "History"), "Reset")
+    group, button = next(
+        (found, button)
+        for label, button in RESETS.items()
+        if (found := wire.find("ButtonGroup", label)) is not None
+    )
+    wire.set(group, button)
 
 
 def turn(_person: Person, wire: Wire, rng: random.Random) -> None:

@@ -73,15 +73,21 @@ class Wire:
         self.send({"type": "CommandTriggerMessage", "uuid": uuid})
 
     def control(self, kind: str, label: str) -> str:
+        """As `find`; LookupError where there is none."""
+        found = self.find(kind, label)
+        if found is None:
+            raise LookupError(f"no {kind} {label!r}")
+        return found
+
+    def find(self, kind: str, label: str) -> str | None:
         """The uuid of a control by its kind, as "Slider", and the start of its label; one that can be seen, if any."""
         named = [
             made
             for made in self.controls.values()
             if made["type"] == f"Gui{kind}Message" and made["props"]["label"].startswith(label)
         ]
-        if not named:
-            raise LookupError(f"no {kind} {label!r}")
-        return next((made for made in named if made["props"]["visible"]), named[0])["uuid"]
+        seen = (made["uuid"] for made in named if made["props"]["visible"])
+        return next(seen, named[0]["uuid"] if named else None)
 
     # ---------------------------------------------------------------- what comes
 

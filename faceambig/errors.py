@@ -2,6 +2,7 @@
 
 ValueError            arguments
 |-- AssetError        files: a model, a landmark scheme, a picture, points
+|-- BeyondTolerance   a fit that misses the points by more than other faces are allowed to
 `-- NotConverged      points and settings for which a fit that the answer rests on has no end
 
 Command line: the message on stderr, exit status 2. Page: a red notice.
@@ -14,6 +15,10 @@ from collections.abc import Iterable
 
 class AssetError(ValueError):
     """A file that cannot be read or does not hold what it should."""
+
+
+class BeyondTolerance(ValueError):
+    """A fit misses its points by more than the tolerance within which other faces are looked for."""
 
 
 class NotConverged(ValueError):

@@ -262,7 +262,7 @@ class Browser:
         with self._one, self._client.atomic():  # else each control wakes the loop, which is here
             self._built = False
             if again:
-                guard.clear(self._client.gui, keep=self.script.elements)
+                guard.clear(self._client.gui, keep=(*self.script.elements, *self.stage.elements))
             self._build()
         self._client.flush()
         self.script.words(words()["page"])

@@ -34,6 +34,7 @@ class Face:
     fit: Fit
     # The points that pictures show: those fitted, or others of the same photograph
     observation: Observation
+    alpha: Array  # (k,) coefficients of this face: the fit's and its bend, or another's
     camera: Camera  # that sees the face so: the fit's own, or a draw's
     vertices: Array  # (N, 3) metres, laid rigidly on the true face
     projected: Array  # (L, 2) pixels
@@ -89,6 +90,7 @@ def measure(
     return Face(
         fit=fit,
         observation=observation,
+        alpha=own_alpha,
         camera=seen_by,
         own_vertices=own,
         vertices=own @ surface.rotation.T + surface.translation,

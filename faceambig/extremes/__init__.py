@@ -29,6 +29,7 @@ import numpy as np
 
 from ..arrays import Array, one_of, positive, read_only, shown, whole
 from ..camera import Camera, project
+from ..errors import BeyondTolerance
 from ..fitting import Fit
 from ..fitting.checks import check_fit_of
 from ..flex import evaluation_modes, gram
@@ -98,7 +99,8 @@ def extreme_faces(
 
     Raises
     ------
-    ValueError: the fit did not converge or has no box, is of another model, or is itself beyond the tolerance.
+    ValueError: the fit did not converge or has no box, or is of another model.
+    BeyondTolerance, a ValueError: the fit itself misses the points by more than the tolerance.
 
     Notes
     -----
@@ -113,7 +115,7 @@ def extreme_faces(
     reached = photo.rms(fit.alpha, fit.camera)
     if not reached < 1:
         least = math.ceil(1e4 * reached * tolerance) / 1e4
-        raise ValueError(
+        raise BeyondTolerance(
             f"tolerance_percent: {tolerance:g} is not above the {least:g} % rms that the fit itself reaches"
         )
     S = len(fit.alpha)

@@ -157,6 +157,31 @@ def test_numbers_are_those_of_the_pipeline():
     assert min(curves["d_l_percent"]) >= record["interval"]["best_d_l_percent"] - 1e-9
 
 
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"camera": "orthographic"},
+        {"data": "outline"},
+        {"flex": ((1, 2.0),)},
+        {"draw": 3, "flex": ((90, 2.0),)},  # a draw is not bent as well
+        {"extreme": 1, "flex": ((1, 2.0),)},
+    ],
+)
+def test_the_numbers_are_of_the_face_that_is_shown_and_the_table_has_a_line_for_each(changes):
+    state = changed(ViewState(subject=3, distance=0.4), **changes)
+    face = faces.face(state.target, state.fitting, state.bend)
+    record = json.loads(export.files(state, "json")[1])
+    np.testing.assert_allclose(
+        face.fit.model.vertices(record["alpha"]), face.own_vertices, atol=1e-12
+    )
+    assert record["distance_m"] == face.camera.distance
+    assert record["translation_m"][:2] == face.camera.t.tolist()
+    lines = export.files(state, "csv")[1].decode().splitlines()
+    rows = list(csv.reader(line for line in lines if not line.startswith("#")))
+    for name in ("translation_m", "rotation", "alpha"):
+        assert [float(row[2]) for row in rows if row[0] == name] == record[name]
+
+
 def test_the_equivalent_lens_sees_the_same_diagonal():
     record = json.loads(export.files(STATE, "json")[1])
     size = fits.photograph(STATE.target).observation.image_size

@@ -75,6 +75,27 @@ def test_a_panel_that_is_made_anew_under_a_moving_hand_is_not_written_into(wires
     assert not caplog.records
 
 
+def test_faces_that_are_shown_in_turn_go_on_in_another_language(wires, caplog):
+    page = server.Page("127.0.0.1", 0)
+    try:
+        wire = wires.Wire(int(page.address.rsplit(":", 1)[1].strip("/")), "show=blink")
+        assert wire.rests(60)
+        assert wire.told["blink"]["nodes"]
+        wire.set(wire.control("ButtonGroup", "Language"), "Deutsch")
+        assert wire.wait(lambda: labelled(wire, "Sprache"), 60)
+        for value, still in ((30, True), (12, False)):
+            wire.told.pop("address")
+            wire.set(wire.control("Slider", "Angenommener Abstand"), value)
+            assert wire.rests(60)
+            assert bool(wire.told["blink"]["nodes"]) is still
+            wire.report(key="Escape")  # they stand still
+        assert not wire.notices
+        wire.close()
+    finally:
+        page.close()
+    assert not caplog.records
+
+
 def labelled(wire: Any, label: str) -> bool:
     """Whether there is a control of this label."""
     return any(made["props"].get("label") == label for made in wire.controls.values())

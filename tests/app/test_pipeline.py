@@ -26,7 +26,7 @@ from faceambig_app.pipeline.likely import Source
 from faceambig_app.pipeline.told import flex_lines, flex_of, pins_of, sliders_of, spectrum_of, told
 from faceambig_app.state import DEFAULT, FIELDS, ViewState, changed
 from faceambig_app.state.fields import VIEWS
-from faceambig_app.text import say
+from faceambig_app.text import say, speaking
 from states import made, values
 
 STEPS = (fits, likely, faces, scenes)
@@ -469,6 +469,16 @@ def test_the_camera_of_a_draw_is_the_best_at_its_distance():
                 camera.kappa,
             )
             assert cost(step) > least
+
+
+def test_where_the_fit_itself_is_beyond_the_tolerance_words_say_that_there_are_no_extremes():
+    state = changed(DEFAULT, distance=0.2, actual=3.0, noise=5.0, extreme=1)
+    for language, words in (
+        ("en", "there are no two extremes"),
+        ("de", "Zwei Extreme gibt es hier nicht"),
+    ):
+        with speaking(language), pytest.raises(ValueError, match=words):
+            frame(state, with_curves=False)
 
 
 def test_the_extreme_faces_are_those_of_the_library_and_their_words_say_how_far():

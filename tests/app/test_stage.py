@@ -18,7 +18,7 @@ import pytest
 
 from faceambig.scene import Head, Lines, Marks, Scene, View
 from faceambig_app import guard
-from faceambig_app.stage import Stage, viewer
+from faceambig_app.stage import Stage, heads, viewer
 from faceambig_app.stage.heads import APART, LETTER, fitted, shaded
 from faceambig_app.stage.marks import CROSS, DISC
 from faceambig_app.stage.viewer import LENS, ZOOM_1
@@ -489,6 +489,37 @@ def test_who_turns_while_words_are_written_writes_none_twice(enter, monkeypatch)
     thread.join(10)
     assert not errors
     assert len(made) == len(set(made)) > 1
+
+
+def test_who_turns_while_a_worker_draws_writes_no_node_and_is_followed(enter, monkeypatch):
+    # else it would move a head that is just being taken out
+    _, shown = enter()
+    shown.show(strip(), False)
+    few, turned, wrote = replace(strip(), heads=strip().heads[:2]), [], set()
+    remove, place = heads.HeadNodes.remove, heads.HeadNodes.place
+
+    def turn() -> None:
+        turned.append(replace(shown._viewer.sight, pixel=1.1 * shown._viewer.sight.pixel))
+        shown._place(turned[0])
+
+    def turning(nodes: heads.HeadNodes) -> None:
+        remove(nodes)
+        if not turned:
+            thread = threading.Thread(target=turn, name="loop")
+            thread.start()
+            thread.join(10)
+
+    def placed(nodes: heads.HeadNodes, *sight: Any) -> None:
+        wrote.add(threading.current_thread().name)
+        place(nodes, *sight)
+
+    monkeypatch.setattr(heads.HeadNodes, "remove", turning)
+    monkeypatch.setattr(heads.HeadNodes, "place", placed)
+    shown._viewer._half_width = max(head.slot for head in few.heads) / 2 + viewer.BESIDE
+    shown.show(few, False)
+    assert turned
+    assert wrote == {threading.current_thread().name}
+    assert shown._sight is shown._asked
 
 
 def test_words_of_neighbours_do_not_touch():

@@ -7,17 +7,16 @@ import io
 import json
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
-
-import numpy as np
 
 import faceambig as fa
 from faceambig.compose import Face, curves
 from faceambig.io.pictures import DIAGONAL_35MM
 from faceambig.scene import Curves
 
-from ..pipeline import faces, fits, likely, told
+from ..pipeline import faces, fits, told
 from ..pipeline.scenes import pin_face
 from ..state import DEFAULT, Fitting, Target, ViewState, changed
 from ..state.forms import to_json
@@ -57,11 +56,11 @@ def measured(state: ViewState) -> dict[str, Any]:
         **source_of(state),
         "subject": fits.photograph(state.target).subject.name,
         "actual_m": state.actual,
-        **numbers_of_fit(state, face.fit),
+        **numbers_of_face(face),
         "plausible": face.plausible,
         "d_l_percent": face.d_l_percent,
         "d_s_mm": face.d_s_mm,
-        "alpha": _alpha(state, face).tolist(),
+        "alpha": face.alpha.tolist(),
         **_along_distance(state),
         **({"pins": _pins(state)} if state.pins else {}),
     }
@@ -80,19 +79,20 @@ def source_of(state: ViewState) -> dict[str, Any]:
     }
 
 
-def numbers_of_fit(state: ViewState, fit: fa.Fit) -> dict[str, Any]:
-    """The numbers of a fit that a bend leaves as they are."""
+def numbers_of_face(face: Face) -> dict[str, Any]:
+    """How a face is seen, by the fit's camera or by its own, and how the fit ended that it is a bend or another of."""
+    seen = replace(face.fit, camera=face.camera)
     return {
-        "camera": state.camera,
-        "distance_m": fit.distance,
-        "status": str(fit.status),
-        "d_l_unit": fit.interocular_meaning,
-        "focal_px": fit.focal,
-        "focal_35mm": focal_35mm(fit),
-        "scale": fit.scale,
-        "rotation": fit.rotation.tolist(),
-        "translation_m": fit.translation.tolist(),
-        "cost": fit.cost,
+        "camera": "orthographic" if seen.distance is None else "perspective",
+        "distance_m": seen.distance,
+        "status": str(seen.status),
+        "d_l_unit": seen.interocular_meaning,
+        "focal_px": seen.focal,
+        "focal_35mm": focal_35mm(seen),
+        "scale": seen.scale,
+        "rotation": seen.rotation.tolist(),
+        "translation_m": seen.translation.tolist(),
+        "cost": seen.cost,
     }
 
 
@@ -104,15 +104,6 @@ def _pins(state: ViewState) -> list[dict[str, Any]]:
         {"name": name, "d_l_percent": face.d_l_percent, "d_s_mm": face.d_s_mm, "between_mm": row.tolist()}
         for name, face, row in zip(kept.names, shown, kept.d_s_mm, strict=True)
     ]  # fmt: skip
-
-
-def _alpha(state: ViewState, face: Face) -> np.ndarray:
-    """(S,) coefficients of the face shown, its bend included."""
-    if not state.flex:
-        return face.fit.alpha
-    last = max(mode for mode, _ in state.flex)
-    modes = likely.bending(state.target, state.fitting, state.flex_at, last)
-    return face.fit.alpha + sum(mm * modes.directions[mode - 1] for mode, mm in state.flex)
 
 
 def focal_35mm(fit: fa.Fit) -> float | None:
@@ -176,7 +167,8 @@ def _rows(record: Mapping[str, Any]) -> list[tuple[str, object, object, str]]:
         if isinstance(value, Mapping):
             rows += [(f"{name}_{part}", "", _cell(v), _unit(part)) for part, v in value.items()]
         elif isinstance(value, list):
-            places = range(1, len(value) + 1) if name == "alpha" else AXES
+            # Of the orthographic camera the translation has no z
+            places = range(1, len(value) + 1) if name == "alpha" else AXES[: len(value)]
             unit = {"alpha": "sd", "rotation": "rad"}.get(name) or _unit(name)
             rows += [(name, at, v, unit) for at, v in zip(places, value, strict=True)]
         else:

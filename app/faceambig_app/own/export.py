@@ -15,7 +15,7 @@ from .. import export
 from ..export import MESHES, SCALES, Progress
 from ..state import ViewState, changed
 from ..text import say
-from .fit import REFERENCE, own_alpha, own_face, own_sweep, problem, reference
+from .fit import REFERENCE, own_face, own_sweep, problem, reference
 from .frame import own_frame
 from .photo import OwnPhoto
 
@@ -92,11 +92,11 @@ def _measured(own: OwnPhoto, state: ViewState) -> dict[str, Any]:
         **export.source_of(state),
         "subject": "photo",
         "points_placed": own.placed,
-        **export.numbers_of_fit(state, face.fit),
+        **export.numbers_of_face(face),
         "plausible": face.plausible,
         "d_l_percent": face.d_l_percent,
         "reference_distance_m": REFERENCE,
         "difference_mm": face.d_s_mm,
-        "alpha": own_alpha(own, state, face.fit).tolist(),
+        "alpha": face.alpha.tolist(),
         **along,
     }

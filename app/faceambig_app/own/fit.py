@@ -11,7 +11,6 @@ from typing import Any, TypeVar
 import numpy as np
 
 import faceambig as fa
-from faceambig.arrays import Array
 from faceambig.compose import Face, bent, curves, measure, stand_in
 from faceambig.flex import FlexibilityModes, plausible_limit
 from faceambig.model import Subject
@@ -117,14 +116,6 @@ def own_face(own: OwnPhoto, state: ViewState, fitting: Fitting, subject: Subject
         limit=max(plausible_limit(len(fit.alpha)), float(np.linalg.norm(fit.alpha))),
         flex=[(modes.words[mode - 1], mm) for mode, mm in state.flex],
     )  # fmt: skip
-
-
-def own_alpha(own: OwnPhoto, state: ViewState, fit: fa.Fit) -> Array:
-    """(S,) coefficients of the face shown, its bend included."""
-    if not state.flex:
-        return fit.alpha
-    modes = _bending(own, state, state.fitting, len(fit.alpha))
-    return fit.alpha + sum(mm * modes.directions[mode - 1] for mode, mm in state.flex)
 
 
 def _bending(own: OwnPhoto, state: ViewState, fitting: Fitting, count: int) -> FlexibilityModes:

@@ -11,10 +11,12 @@ import numpy as np
 
 import faceambig as fa
 from faceambig.compose import Face, curves, measure, with_density
-from faceambig.errors import NotConverged
+from faceambig.errors import BeyondTolerance, NotConverged
+from faceambig.metrics import HUMAN_TOLERANCE_PERCENT
 from faceambig.scene import Curves
 
 from ..state import Bend, Fitting, Target
+from ..text import say
 from .fits import fitted, options, photograph
 from .likely import Source, bending, drawn, extremes, limit, posterior, source
 
@@ -22,12 +24,20 @@ from .likely import Source, bending, drawn, extremes, limit, posterior, source
 FEW = (0.2, 3.0, 13)
 
 
-@lru_cache(maxsize=64)
 def face(target: Target, fitting: Fitting, bend: Bend) -> Face:
-    """The face of a state, measured against the true one.
+    """The face of a state, measured against the true one; ValueError in words where there is none.
 
     An extreme face goes before a draw, and a draw before bends: each stands for the whole face.
     """
+    try:
+        return _face(target, fitting, bend)
+    except BeyondTolerance as error:
+        tolerance = f"{HUMAN_TOLERANCE_PERCENT:g}"
+        raise ValueError(say("flex.no_extremes", tolerance=tolerance)) from error
+
+
+@lru_cache(maxsize=64)
+def _face(target: Target, fitting: Fitting, bend: Bend) -> Face:
     fit = fitted(target, fitting)
     taken = photograph(target)
     shown = taken.observation if target.data == "dense" else None

@@ -7,7 +7,6 @@ first of them.
 from __future__ import annotations
 
 import textwrap
-import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -96,7 +95,7 @@ class HeadNodes:
     def __init__(self, client: viser.ClientHandle, head: Head, bold: float = 1.0) -> None:
         """bold: times that words and lines are larger."""
         scene, root = client.scene, f"/{head.name}"
-        self._bold, self._placing = bold, threading.Lock()
+        self._bold = bold
         self._root = scene.add_frame(root, show_axes=False)
         self._faces, self._coarse_faces = head.faces, head.coarse_faces
         vertices = head.vertices.astype(np.float32)
@@ -198,12 +197,10 @@ class HeadNodes:
 
     def place(self, sight: Sight, wxyz: NDArray[np.float64]) -> None:
         """Stand along the viewer's right; the board faces the viewer and stays inside what is seen."""
-        # The viewer turns on the loop while a worker draws: two labels of one name would each remove the other
-        with self._placing:
-            placed = (sight, self._offset, self._depth, self._wanted)
-            if self._placed != placed:
-                self._placed = placed
-                self._put(sight, wxyz)
+        placed = (sight, self._offset, self._depth, self._wanted)
+        if self._placed != placed:
+            self._placed = placed
+            self._put(sight, wxyz)
 
     def _put(self, sight: Sight, wxyz: NDArray[np.float64]) -> None:
         self._root.position = self._offset * sight.board[:, 0]

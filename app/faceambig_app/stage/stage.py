@@ -6,6 +6,7 @@ Heads of one slot are drawn over each other: a ghost, or two faces in turn. On t
 
 from __future__ import annotations
 
+import threading
 from typing import Any
 
 import numpy as np
@@ -60,7 +61,10 @@ class Stage:
         self._points: dict[tuple[str, str], PointNodes] = {}
         self._lines: dict[tuple[str, str], LineNodes] = {}
         self._blink: viser.GuiHtmlHandle | None = None
-        self._sight: Sight | None = None
+        # The viewer turns on the loop while a worker draws: one writes nodes, and does the other's work before it ends
+        self._writing = threading.Lock()
+        self._asked: Sight | None = None  # as the viewer sees now
+        self._sight: Sight | None = None  # as all nodes stand
         self._wxyz = np.array([1.0, 0.0, 0.0, 0.0])
         self._lit = True
         self._light_room()
@@ -90,8 +94,18 @@ class Stage:
         """A hand is turning the viewer, as the page's script tells."""
         self._viewer.by_hand()
 
+    @property
+    def elements(self) -> tuple[str, ...]:
+        """Identifiers of its own elements, which stay when a panel is made anew."""
+        return () if self._blink is None else (self._blink._impl.uuid,)
+
     def show(self, scene: Scene, draft: bool) -> None:
         """Draw the heads; a draft has the coarse mesh. Call inside client.atomic()."""
+        with self._writing:
+            self._draw(scene, draft)
+        self._catch_up()
+
+    def _draw(self, scene: Scene, draft: bool) -> None:
         self._clear(scene)
         through = scene.through_camera
         slots = [head.slot for head in scene.heads]
@@ -119,10 +133,11 @@ class Stage:
                     self._where[head.name] = where
             nodes.write(_board(scene, head))
             nodes.stand(0.0 if through else head.slot - middle, seen, depth)
-        self._mark(scene, draft)
+        sight = self._viewer.sight
+        self._mark(scene, draft, sight)
         self._read_colours(all(head.lit for head in scene.heads))
         self._take_turns(scene)
-        self._stand(self._viewer.sight)
+        self._stand(sight)
 
     def _clear(self, scene: Scene) -> None:
         """Take out what the scene no longer has; what has other triangles is made anew."""
@@ -141,14 +156,14 @@ class Stage:
             self._heads.pop(name).remove()
             self._where.pop(name, None)
 
-    def _mark(self, scene: Scene, draft: bool) -> None:
+    def _mark(self, scene: Scene, draft: bool, sight: Sight) -> None:
         """Points and lines; not through the subject's camera, where the photograph has them."""
         pivot, visible = np.asarray(scene.pivot), not scene.through_camera
         for mark in scene.marks:
             key = (mark.head, mark.tone)
             if key not in self._points:
                 self._points[key] = PointNodes(self._scene, mark, self._bold)
-            self._points[key].show(mark, pivot, self._viewer.sight, draft, visible)
+            self._points[key].show(mark, pivot, sight, draft, visible)
         for line in scene.lines:
             key = (line.head, line.name)
             if key not in self._lines:
@@ -167,17 +182,25 @@ class Stage:
         self._blink.content = data_html("blink", {"nodes": nodes, "seconds": BLINK_SECONDS})
 
     def _place(self, sight: Sight) -> None:
-        """Stand everything as it is now seen; inside client.atomic(), perhaps while a worker draws."""
-        self._stand(sight)
-        for nodes in list(self._points.values()):
-            nodes.turn(sight)
+        """Stand everything as it is now seen; inside client.atomic(). Where a worker draws, he does it."""
+        self._asked = sight
+        self._catch_up()
+
+    def _catch_up(self) -> None:
+        while (sight := self._asked) not in (None, self._sight) and self._writing.acquire(False):
+            try:
+                self._stand(sight)
+                for nodes in self._points.values():
+                    nodes.turn(sight)
+            finally:
+                self._writing.release()
 
     def _stand(self, sight: Sight) -> None:
         """Stand the heads along the viewer's right, with the lights."""
         if sight is not self._sight:
             self._sight, self._wxyz = sight, quaternion(sight.board)
             self._lights.wxyz = self._wxyz
-        for nodes in list(self._heads.values()):
+        for nodes in self._heads.values():
             nodes.place(sight, self._wxyz)
 
     def _light_room(self) -> None:
