@@ -30,10 +30,7 @@ def snapshot(
 ) -> np.ndarray:
     """The page's picture of a state, drawn off-screen: (H, W, 4) uint8 RGBA, and a PNG file if `path` is given."""
     # pyrender and OpenCV only when a picture is asked for
-    from faceambig.render.overlay import (
-        draw,
-        encode_png,
-    )
+    from faceambig.render.overlay import draw, encode_png
 
     with speaking(state.lang):
         drawn = draw(pipeline.frame(state).scene, width, height, words=drawn_words())
