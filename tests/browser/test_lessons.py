@@ -85,6 +85,7 @@ class Hand:
     def begin(self, lesson: Lesson) -> None:
         box = self.me.tab.get_by_label(say("field.lesson"), exact=True).first
         option = self.me.tab.get_by_role("option", name=f"{lesson.number} {lesson.title}")
+        self.me.rest()  # the words of a lesson that was left would move away under the finger
         self.hit(box)
         self.hit(option)
 
